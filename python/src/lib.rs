@@ -1,0 +1,1 @@
+//! The Python extension `abbe._core`: a thin border over the core.

@@ -1,0 +1,1 @@
+//! Where camera rays begin, and how they move with the pixel.

@@ -1,0 +1,1 @@
+//! Multichannel EXR: layers, types, header, atomic writing, merging.

@@ -1,0 +1,1 @@
+//! What is computed for a pixel; the plug-in point.

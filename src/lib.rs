@@ -1,0 +1,42 @@
+//! `abbe` renders scenes with dispersive glass and tells how everything it sees moves with wavelength.
+//!
+//! The core carries *spectral ray differentials* (Elek et al. 2014): the derivatives of a ray's position and optical
+//! momentum K = n(λ)·d with respect to the screen and the wavelength, through every refraction and reflection. It has
+//! never heard of USD, Python or files in any layer above [`exr`] and [`scene::file`].
+//!
+//! Conventions: wavelengths are in nanometres and have a type ([`spectrum::Wavelength`]); lengths are in stage units;
+//! geometry, momenta and derivatives are `f64`, authored points stay `f32` in object space; pixel vectors are +x right,
+//! +y up; image rows run down.
+//!
+//! | layer | what it knows |
+//! |---|---|
+//! | [`math`], [`error`], [`diagnostics`] | compensated arithmetic; errors; structured warnings |
+//! | [`spectrum`] | wavelengths, lines, responses |
+//! | [`optics`] | n(λ) and its derivatives, media and their priorities |
+//! | [`ray`] | columns, transfer, scattering, footprint, chromatic motion: the calculus |
+//! | [`geometry`] | shapes, instances, trees, hits |
+//! | [`camera`], [`sampler`] | where rays begin |
+//! | [`scene`] | the description, its checks, the compiled scene |
+//! | [`film`] | the AOV table, layers, sums independent of grouping |
+//! | [`integrator`] | what is computed for a pixel; the plug-in point |
+//! | [`render`] | settings, plan, tiles, progress, statistics |
+//! | [`exr`] | multichannel files |
+//!
+//! Imports go down this table only from its bottom up: a layer knows those above it (`tests/architecture.rs`).
+
+pub mod camera;
+pub mod diagnostics;
+pub mod error;
+pub mod exr;
+pub mod film;
+pub mod geometry;
+pub mod integrator;
+pub mod math;
+pub mod optics;
+pub mod ray;
+pub mod render;
+pub mod sampler;
+pub mod scene;
+pub mod spectrum;
+
+pub use error::{Error, Result};

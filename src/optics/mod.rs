@@ -1,0 +1,1 @@
+//! Refractive indices with their wavelength derivatives, and the media a ray is in.

@@ -1,0 +1,1 @@
+//! The calculus: how a ray moves with the screen and with the wavelength.

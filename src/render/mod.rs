@@ -1,0 +1,1 @@
+//! Settings, plan, tiles, progress, statistics: a render from request to film.

@@ -1,0 +1,438 @@
+//! The scene description: what a bridge hands over. One schema, a JSON document beside named arrays, in memory or as a file.
+//!
+//! Nothing here is checked beyond its types; [`builder`](super::builder) checks everything when it makes a
+//! [`Scene`](super::Scene). The document says what was authored; what it means for optics is decided by the core.
+//!
+//! Conventions: matrices are 16 doubles, row-major with row vectors as USD has them (translation in the last row), mapping
+//! object space to the stage's world. Arrays are named by strings and stand in [`Arrays`]; shapes are `[n]` or `[n, k]`.
+//! Wavelengths are in nm. Unknown fields are refused, so that a newer file is not half understood.
+
+use std::collections::BTreeMap;
+
+use bytes::Bytes;
+use serde::{Deserialize, Serialize};
+
+use crate::diagnostics::Diagnostics;
+use crate::error::{Error, Result};
+
+/// The schema's name and version as they stand in every document.
+pub const FORMAT: &str = "abbe-scene";
+/// Raised when a document of the old version would be misunderstood.
+pub const VERSION: u32 = 1;
+
+/// A value as it was authored, with its type: `{"type": "float", "value": 1.5}`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Authored {
+    /// Sdf type name: `float`, `double`, `int`, `bool`, `token`, `string`, `asset`, `double[]`, `double2[]`, `color3f` …
+    #[serde(rename = "type")]
+    pub type_name: String,
+    /// The value: a number, a string, a boolean or (nested) lists of numbers.
+    pub value: serde_json::Value,
+}
+
+/// Authored values by full attribute name, for instance `abbe:dispersion:vd`.
+pub type AuthoredMap = BTreeMap<String, Authored>;
+
+/// The document.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Document {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`VERSION`].
+    pub version: u32,
+    /// Where the scene comes from.
+    pub stage: Stage,
+    /// Shapes, referred to by index.
+    pub shapes: Vec<Shape>,
+    /// Groups of placed shapes and groups, referred to by index.
+    pub groups: Vec<Group>,
+    /// The group that is the scene.
+    pub root: usize,
+    /// Materials, referred to by index.
+    pub materials: Vec<Material>,
+    /// Cameras, referred to by index. The first is the default.
+    pub cameras: Vec<Camera>,
+    /// Render settings, products flattened.
+    #[serde(default)]
+    pub settings: Settings,
+    /// What the bridge had to say.
+    #[serde(default)]
+    pub warnings: Diagnostics,
+    /// What the bridge left out for a reason that is no warning: reason → count (`invisible`, `purpose proxy`).
+    #[serde(default)]
+    pub skipped: BTreeMap<String, u64>,
+}
+
+/// Stage metadata.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stage {
+    /// The stage's root layer as the user named it.
+    pub source: String,
+    /// Metres per stage unit.
+    pub meters_per_unit: f64,
+    /// `Y` or `Z`.
+    pub up_axis: String,
+    /// The time code that was read; absent for default values.
+    #[serde(default)]
+    pub time_code: Option<f64>,
+    /// Frames per second of the stage.
+    #[serde(default)]
+    pub frames_per_second: Option<f64>,
+}
+
+/// A shape in its object space.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "snake_case")]
+pub enum Shape {
+    /// An analytic sphere about the origin.
+    Sphere {
+        /// Prim path.
+        path: String,
+        /// Radius > 0.
+        radius: f64,
+    },
+    /// A polygon mesh.
+    Mesh(Mesh),
+}
+
+/// A polygon mesh as authored.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mesh {
+    /// Prim path (that of the prototype where prims share the mesh).
+    pub path: String,
+    /// Array f32 `[n, 3]`.
+    pub points: String,
+    /// Array i32 `[faces]`.
+    pub face_vertex_counts: String,
+    /// Array i32 `[corners]`.
+    pub face_vertex_indices: String,
+    /// Array i32: faces that are holes.
+    #[serde(default)]
+    pub hole_indices: Option<String>,
+    /// Winding is clockwise seen from outside (`orientation = leftHanded`).
+    #[serde(default)]
+    pub left_handed: bool,
+    /// Shading normals, f32 `[n, 3]`.
+    #[serde(default)]
+    pub normals: Option<Primvar>,
+    /// Texture coordinates, f32 `[n, 2]`.
+    #[serde(default)]
+    pub uv: Option<Primvar>,
+    /// Faces with materials of their own. Faces in none have the placement's material.
+    #[serde(default)]
+    pub subsets: Vec<Subset>,
+}
+
+/// Values over a mesh.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Primvar {
+    /// Array of values.
+    pub values: String,
+    /// Array i32 of indices into the values, if indexed.
+    #[serde(default)]
+    pub indices: Option<String>,
+    /// `constant`, `uniform`, `varying`, `vertex` or `faceVarying`.
+    pub interpolation: String,
+}
+
+/// Faces of a mesh with a material of their own (a GeomSubset of family `materialBind`).
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Subset {
+    /// Prim path.
+    pub path: String,
+    /// Array i32 of face indices.
+    pub faces: String,
+}
+
+/// Things placed together.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Group {
+    /// For messages: a prim path.
+    pub path: String,
+    /// What stands in it.
+    pub items: Vec<Placement>,
+}
+
+/// A shape or a group, placed.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Placement {
+    /// Prim path as it appears on the composed stage; the `prim_id` of shapes.
+    pub path: String,
+    /// What is placed.
+    pub target: Target,
+    /// Parent space from object space; identity if absent.
+    #[serde(default)]
+    pub transform: Option<[f64; 16]>,
+    /// Path of the instance this belongs to; the `instance_id`.
+    #[serde(default)]
+    pub instance: Option<String>,
+    /// Material of the faces in no subset.
+    #[serde(default)]
+    pub material: Option<usize>,
+    /// Materials of the mesh's subsets, in their order; shorter or `null`: the material above.
+    #[serde(default)]
+    pub subset_materials: Vec<Option<usize>>,
+    /// Lit and shaded from both sides; for glass the sides are decided by the normal alone.
+    #[serde(default)]
+    pub double_sided: bool,
+}
+
+/// What a placement places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "snake_case")]
+pub enum Target {
+    /// Index into [`Document::shapes`].
+    Shape(usize),
+    /// Index into [`Document::groups`].
+    Group(usize),
+}
+
+/// A material as authored.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// Prim path.
+    pub path: String,
+    /// Authored `abbe:…` attributes of the Material prim.
+    #[serde(default)]
+    pub abbe: AuthoredMap,
+    /// Authored `inputs:abbe:…` of the Material's interface, keyed without `inputs:`.
+    #[serde(default)]
+    pub interface_abbe: AuthoredMap,
+    /// The surface shader that the chosen terminal leads to.
+    #[serde(default)]
+    pub surface: Option<Shader>,
+}
+
+/// A surface shader as authored.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shader {
+    /// Prim path.
+    pub path: String,
+    /// `info:id`, for instance `ND_open_pbr_surface_surfaceshader`.
+    pub id: String,
+    /// The terminal it was found through: `outputs:abbe:surface`, `outputs:mtlx:surface` or `outputs:surface`.
+    pub terminal: String,
+    /// Authored constant inputs by name without `inputs:`, connections to constants followed.
+    #[serde(default)]
+    pub inputs: AuthoredMap,
+    /// Inputs driven by a network: name → the path of the output that drives it.
+    #[serde(default)]
+    pub connected: BTreeMap<String, String>,
+    /// Authored `inputs:abbe:…`, keyed without `inputs:`, connections followed.
+    #[serde(default)]
+    pub abbe: AuthoredMap,
+}
+
+/// A camera as authored (UsdGeomCamera: apertures and focal length in tenths of a stage unit).
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Prim path; empty for a camera that the bridge framed by itself.
+    pub path: String,
+    /// World from camera space (camera looks along −z, y up).
+    pub transform: [f64; 16],
+    /// `perspective` or `orthographic`.
+    pub projection: String,
+    /// Tenths of a stage unit.
+    pub horizontal_aperture: f64,
+    /// Tenths of a stage unit.
+    pub vertical_aperture: f64,
+    /// Tenths of a stage unit, +x right.
+    #[serde(default)]
+    pub horizontal_aperture_offset: f64,
+    /// Tenths of a stage unit, +y up.
+    #[serde(default)]
+    pub vertical_aperture_offset: f64,
+    /// Tenths of a stage unit.
+    pub focal_length: f64,
+    /// Near and far, stage units.
+    #[serde(default)]
+    pub clipping_range: Option<[f64; 2]>,
+    /// 0 for a pinhole.
+    #[serde(default)]
+    pub f_stop: f64,
+    /// Stage units.
+    #[serde(default)]
+    pub focus_distance: f64,
+    /// Shutter opening, frames relative to the time code.
+    #[serde(default)]
+    pub shutter_open: f64,
+    /// Shutter closing.
+    #[serde(default)]
+    pub shutter_close: f64,
+}
+
+/// Render settings with their products flattened by the rules of UsdRenderComputeSpec.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// Prim path, if the stage has any.
+    #[serde(default)]
+    pub path: Option<String>,
+    /// Authored `abbe:…` attributes.
+    #[serde(default)]
+    pub abbe: AuthoredMap,
+    /// One per product; none if the stage has none.
+    #[serde(default)]
+    pub products: Vec<Product>,
+    /// Resolution and window of the settings prim itself, for stages with settings but no product.
+    #[serde(default)]
+    pub base: Option<Product>,
+}
+
+/// One output file of the stage.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Product {
+    /// Prim path.
+    pub path: String,
+    /// `productName`, tokens already replaced; empty if unusable.
+    pub name: String,
+    /// `productType`.
+    #[serde(default)]
+    pub product_type: String,
+    /// Index of the camera; the default camera if absent.
+    #[serde(default)]
+    pub camera: Option<usize>,
+    /// Only if authored on the product or the settings.
+    #[serde(default)]
+    pub resolution: Option<[i64; 2]>,
+    /// `pixelAspectRatio`.
+    pub pixel_aspect_ratio: f64,
+    /// `aspectRatioConformPolicy`.
+    pub aspect_ratio_conform_policy: String,
+    /// xmin, ymin, xmax, ymax, y up.
+    pub data_window_ndc: [f64; 4],
+    /// Depth of field is off.
+    #[serde(default)]
+    pub disable_depth_of_field: bool,
+    /// Motion blur is off.
+    #[serde(default)]
+    pub disable_motion_blur: bool,
+    /// `renderingColorSpace`; empty if not authored.
+    #[serde(default)]
+    pub rendering_color_space: String,
+    /// Authored `abbe:…` attributes.
+    #[serde(default)]
+    pub abbe: AuthoredMap,
+    /// Authored `driver:parameters:…` attributes, keyed without that prefix.
+    #[serde(default)]
+    pub driver: AuthoredMap,
+    /// The variables, in order.
+    #[serde(default)]
+    pub vars: Vec<Var>,
+}
+
+/// One RenderVar of a product.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Var {
+    /// Prim path.
+    pub path: String,
+    /// Prim name.
+    pub name: String,
+    /// `sourceName`.
+    pub source_name: String,
+    /// `raw`, `primvar`, `lpe` or `intrinsic`.
+    #[serde(default)]
+    pub source_type: String,
+    /// `dataType`.
+    #[serde(default)]
+    pub data_type: String,
+    /// Authored `driver:parameters:aov:…` (and `ri:driver:parameters:aov:…`), keyed without that prefix.
+    #[serde(default)]
+    pub driver: AuthoredMap,
+    /// Authored `abbe:…` attributes.
+    #[serde(default)]
+    pub abbe: AuthoredMap,
+}
+
+/// Element type of an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Element {
+    /// `f32`
+    F32,
+    /// `f64`
+    F64,
+    /// `i32`
+    I32,
+    /// `u8`
+    U8,
+}
+
+impl Element {
+    /// Bytes per element.
+    pub fn size(self) -> usize {
+        match self {
+            Self::F32 | Self::I32 => 4,
+            Self::F64 => 8,
+            Self::U8 => 1,
+        }
+    }
+}
+
+/// A named array: shared bytes with a type and a shape. Cloning shares.
+#[derive(Clone, Debug)]
+pub struct Array {
+    /// Element type.
+    pub element: Element,
+    /// Row-major shape.
+    pub shape: Vec<usize>,
+    /// The memory: ours, Python's or a mapped file's. Aligned to the element, or the accessors refuse it.
+    pub bytes: Bytes,
+}
+
+impl Array {
+    /// Owned values as an array of shape `[n, k]` (`[n]` if `columns` is 1).
+    pub fn from_vec<T: bytemuck::NoUninit + Send + Sync>(element: Element, columns: usize, values: Vec<T>) -> Self {
+        struct Owner<T>(Vec<T>);
+        impl<T: bytemuck::NoUninit> AsRef<[u8]> for Owner<T> {
+            fn as_ref(&self) -> &[u8] {
+                bytemuck::cast_slice(&self.0)
+            }
+        }
+        let count = std::mem::size_of_val(values.as_slice()) / element.size();
+        let shape = if columns == 1 { vec![count] } else { vec![count / columns, columns] };
+        Self { element, shape, bytes: Bytes::from_owner(Owner(values)) }
+    }
+}
+
+/// Arrays by name.
+pub type Arrays = BTreeMap<String, Array>;
+
+/// A document with its arrays.
+#[derive(Clone, Debug)]
+pub struct Description {
+    /// The document.
+    pub document: Document,
+    /// The arrays that it names.
+    pub arrays: Arrays,
+}
+
+impl Description {
+    /// Reads the document's JSON; `place` names its origin in errors.
+    pub fn from_json(json: &str, arrays: Arrays, place: &str) -> Result<Self> {
+        let document: Document = serde_json::from_str(json)
+            .map_err(|e| Error::scene(place, format!("is not a scene description of version {VERSION}: {e}")))?;
+        if document.format != FORMAT || document.version != VERSION {
+            return Err(Error::scene(
+                place,
+                format!(
+                    "is '{}' version {}, this abbe reads '{FORMAT}' version {VERSION}: export the stage again",
+                    document.format, document.version
+                ),
+            ));
+        }
+        Ok(Self { document, arrays })
+    }
+}

@@ -1,0 +1,3 @@
+//! The scene: its description, the checks, the compiled form.
+
+pub mod description;

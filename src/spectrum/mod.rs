@@ -1,0 +1,1 @@
+//! Wavelengths, spectral lines, responses.
