@@ -143,8 +143,7 @@ pub(super) fn interface(
 ) -> Scattering {
     let g = momentum.dot(normal);
     let w_squared = w_squared(ior_i.ior, ior_t.ior, g);
-    // Negated, so that a NaN does not pass for transmission.
-    if !(w_squared > 0.0) {
+    if w_squared <= 0.0 {
         return reflection(ScatterKind::TotalReflection, momentum, normal, field, g, w_squared, ior_i, ior_t);
     }
     let w = w_squared.sqrt();
