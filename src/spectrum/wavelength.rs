@@ -3,7 +3,8 @@
 use std::fmt;
 
 /// A vacuum-or-air wavelength as catalogues give it; the renderer does not tell the two apart (2.7e-4, below any law here).
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, serde::Serialize)]
+#[serde(transparent)]
 pub struct Wavelength {
     nanometers: f64,
 }
