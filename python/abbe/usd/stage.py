@@ -11,13 +11,14 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from ..errors import StageError, UsageError
 from . import tokens
 from ._pxr import Ar, Pcp, Sdf, Usd, UsdUtils
 from .description import Diagnostics
-from .values import TfError, place
+from .values import place
 
 __all__ = ["OpenedStage", "composition_warnings", "open_stage", "quiet_usd"]
 
@@ -37,7 +38,11 @@ class OpenedStage:
 
 def source_name(stage_or_path: Any) -> str:
     """Return what messages call a stage: its path as given, or its root layer."""
-    return stage_or_path.GetRootLayer().identifier if isinstance(stage_or_path, Usd.Stage) else str(stage_or_path)
+    if not isinstance(stage_or_path, Usd.Stage):
+        return str(stage_or_path)
+    root = stage_or_path.GetRootLayer()
+    # An anonymous layer's identifier is an address, which no two runs share.
+    return str(root.GetDisplayName() or "stage in memory") if root.anonymous else str(root.realPath or root.identifier)
 
 
 @contextmanager
@@ -122,26 +127,28 @@ def _context(path: str, search_paths: Sequence[str | os.PathLike[str]], diagnost
     own = resolver.CreateDefaultContextForAsset(path)
     if not search_paths:
         return own
-    folders = [os.path.abspath(os.fspath(folder)) for folder in search_paths]
+    folders = [Path(folder).absolute() for folder in search_paths]
     for folder in folders:
-        if not os.path.isdir(folder):
+        if not folder.is_dir():
             raise UsageError(f"search path {folder}: is no folder: correct or remove it")
     if not isinstance(Ar.GetUnderlyingResolver(), Ar.DefaultResolver):
         diagnostics.warn("search-path", path, "the site's own asset resolver is in use; search paths are ignored")
         return own
-    beside = os.path.dirname(os.path.abspath(path))
-    return Ar.ResolverContext(Ar.DefaultResolverContext([beside, *folders]))
+    beside = Path(path).absolute().parent
+    return Ar.ResolverContext(Ar.DefaultResolverContext([str(folder) for folder in (beside, *folders)]))
 
 
 def _root_layer(path: str, context: Any) -> Any:
-    if os.path.isdir(path):
+    if not path:
+        raise UsageError("stage: the path is empty: give that of a USD file")
+    if Path(path).is_dir():
         raise StageError(f"{path}: is a folder, not a USD file: name the file in it")
     with Ar.ResolverContextBinder(context):
-        if not os.path.exists(path) and not Ar.GetResolver().Resolve(path):
+        if not Path(path).exists() and not Ar.GetResolver().Resolve(path):
             raise FileNotFoundError(f"{path}: there is no such file: check the path")
         try:
             layer = Sdf.Layer.FindOrOpen(path)
-        except TfError as error:
+        except RuntimeError as error:
             raise StageError(f"{path}: cannot be read as USD: {_tf_reason(error)}: export it again") from None
     if not layer:
         raise StageError(f"{path}: is not a USD file (.usda, .usdc, .usd, .usdz), or it cannot be read: check the file")
@@ -151,7 +158,7 @@ def _root_layer(path: str, context: Any) -> Any:
 def _compose(open_it: Any, source: str) -> Any:
     try:
         stage = open_it()
-    except TfError as error:
+    except RuntimeError as error:
         raise StageError(f"{source}: cannot be composed: {_tf_reason(error)}: correct the file") from None
     if not stage:
         raise StageError(f"{source}: cannot be composed: correct the file")
@@ -163,7 +170,7 @@ def _from_memory(
 ) -> OpenedStage:
     """Return the caller's stage itself, or, where something is overridden, a second stage on the same layers."""
     root = stage.GetRootLayer()
-    source = root.realPath or root.identifier
+    source = source_name(stage)
     if search_paths:
         raise UsageError("search_paths: a stage in memory is composed already: open it with them, or give its path")
     if not variants and not overrides:
@@ -171,7 +178,9 @@ def _from_memory(
     session = _session_layer()
     theirs = stage.GetSessionLayer()
     if theirs:
-        session.subLayerPaths.append(theirs.identifier)
+        # Stage metadata is read from the session's root layer alone.
+        UsdUtils.CopyLayerMetadata(theirs, session, True)
+        session.subLayerPaths = [theirs.identifier]
     context = stage.GetPathResolverContext()
     mask = stage.GetPopulationMask()
     # Payloads are loaded only once the rules are those of the caller's stage.
@@ -204,7 +213,9 @@ def _select_variant(opened: OpenedStage, text: str) -> None:
     """Select a variant, given as ``/World/Ball{material=glass}``; USD itself would accept names that do not exist."""
     match = _VARIANT.match(text.strip())
     if not match:
-        raise UsageError(f"variant '{text}': is not of the form PRIM{{SET=NAME}}, such as /World/Ball{{material=glass}}")
+        raise UsageError(
+            f"variant '{text}': is not of the form PRIM{{SET=NAME}}, such as /World/Ball{{material=glass}}"
+        )
     prim = _prim(opened, match["prim"], f"variant '{text}'")
     sets = prim.GetVariantSets()
     if match["set"] not in sets.GetNames():
@@ -247,23 +258,30 @@ def _set_value(opened: OpenedStage, target: str, value: Any) -> None:
     prim = _prim(opened, prim_path, option)
     attribute = prim.GetAttribute(name)
     if not attribute:
+        attribute = _our_attribute(prim, name)
+    if not attribute:
         near = sorted(a.GetName() for a in prim.GetAuthoredAttributes())
         raise StageError(f"{place(prim)}: has no attribute '{name}': {_choice('authored attributes', near)}")
+    if attribute.HasAuthoredConnections():
+        driver = attribute.GetConnections()[0]
+        raise StageError(f"{place(prim)}.{name}: is driven by {place(driver)}, so a value has no effect: set that one")
     type_name = attribute.GetTypeName()
     if isinstance(value, str):
         value = _parse(value, type_name, f"{place(prim)}.{name}")
     try:
         done = attribute.Set(value)
-    except (TypeError, *TfError):  # type: ignore[misc]
+    except (TypeError, RuntimeError):
         done = False
     if not done:
         raise StageError(f"{place(prim)}.{name} = {value}: is no value of type {type_name}: correct {option}")
-    if attribute.ValueMightBeTimeVarying():
-        # A default set above time samples is never seen; one sample in a stronger layer replaces them all.
-        attribute.Set(value, Usd.TimeCode(0.0))
 
 
-_TEXT_TYPES = ("string", "token", "asset")
+def _our_attribute(prim: Any, name: str) -> Any:
+    """Return an attribute of our own schemas, declared where the prim's type may carry it; else None."""
+    for schema, names in tokens.OUR_SCHEMAS.items():
+        if prim.GetTypeName() == schema and name in names:
+            return prim.CreateAttribute(name, Sdf.ValueTypeNames.Find(names[name]), False)
+    return None
 
 
 def _parse(text: str, type_name: Any, where: str) -> Any:
@@ -281,7 +299,7 @@ def _parse(text: str, type_name: Any, where: str) -> Any:
     layer = Sdf.Layer.CreateAnonymous("abbe-value.usda")
     try:
         read = layer.ImportFromString(f'#usda 1.0\nover "x"\n{{\n    {name} value = {text}\n}}\n')
-    except TfError:
+    except RuntimeError:
         read = False
     spec = layer.GetAttributeAtPath("/x.value") if read else None
     if spec is None or spec.default is None or len(layer.rootPrims) != 1 or len(layer.rootPrims[0].properties) != 1:
@@ -296,8 +314,8 @@ def _unquoted(text: str) -> str:
 def stage_time(stage: Any, frame: float | str | None) -> tuple[Any, float | None]:
     """Return the time code to read at, and its number (None where it has none).
 
-    None means the stage's authored start; without one the earliest sample of each attribute, as usdrecord has it, so that
-    attributes with time samples alone still have a value. ``"default"`` means the default values.
+    None means the stage's authored start; without one the earliest sample of each attribute, as usdrecord has it, so
+    that attributes with time samples alone still have a value. ``"default"`` means the default values.
     """
     if isinstance(frame, str):
         if frame != "default":
