@@ -29,6 +29,7 @@ from .stage import (
     source_name,
     stage_metadata,
     stage_time,
+    usd_reason,
 )
 from .values import IDENTITY, is_finite, matrix, place, read
 
@@ -270,7 +271,7 @@ def read_stage(
             return _read(opened, diagnostics, frame, camera, render_settings, product, purposes, missing, strict)
         except Tf.ErrorException as error:
             # A call of USD that no one expects to fail: the stage is at fault, or we are; either way no traceback.
-            raise StageError(f"{opened.source}: USD cannot read it: {' '.join(str(error).split())}") from error
+            raise StageError(f"{opened.source}: USD cannot read it: {usd_reason(error)}: correct the file") from error
 
 
 def _read(

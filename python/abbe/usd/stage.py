@@ -20,7 +20,17 @@ from ._pxr import Ar, Pcp, Sdf, Usd, UsdUtils
 from .description import Diagnostics
 from .values import place
 
-__all__ = ["OpenedStage", "composition_warnings", "open_stage", "quiet_usd"]
+__all__ = [
+    "OpenedStage",
+    "Overrides",
+    "composition_warnings",
+    "open_stage",
+    "quiet_usd",
+    "source_name",
+    "stage_metadata",
+    "stage_time",
+    "usd_reason",
+]
 
 Overrides = Mapping[str, Any] | Sequence[str]
 """``{"/World/Glass.inputs:ior": 1.6}`` or ``["/World/Glass.inputs:ior=1.6"]``."""
@@ -59,11 +69,18 @@ def quiet_usd(source: str, diagnostics: Diagnostics) -> Iterator[None]:
         try:
             for item in delegate.TakeUncoalescedDiagnostics():
                 if not any(name in item.sourceFunction for name in _REPORTED_ELSEWHERE):
-                    message = " ".join(str(item.commentary).split())
-                    diagnostics.warn("usd", source, _ADDRESS.sub("", message))
+                    diagnostics.warn("usd", source, _commentary(item))
         finally:
             # The delegate listens until it is destroyed.
             del delegate
+
+
+def _commentary(item: Any) -> str:
+    """Return what USD says, on one line and without addresses, which no two runs share."""
+    try:
+        return _ADDRESS.sub("", " ".join(str(item.commentary).split()))
+    except UnicodeDecodeError:
+        return "USD met something that is no text"
 
 
 # UsdStage::_ReportErrors, Sdf_CrateFile::_CheckFileVersion, UsdShadeMaterialBindingAPI's BindingsAtPrim (a missing API
@@ -73,10 +90,15 @@ _ADDRESS = re.compile(r" <0x[0-9a-f]+>")
 _COMMENTARY = re.compile(r"at line \d+ in file \S+ : '(.*?)'\s*(?=\n|$)", re.DOTALL)
 
 
-def _tf_reason(error: BaseException) -> str:
+def usd_reason(error: BaseException) -> str:
     """Return the first reason in a Tf error, on one line and without USD's own source positions."""
-    found = _COMMENTARY.findall(str(error))
-    text = found[0] if found else str(error)
+    try:
+        text = str(error)
+    except UnicodeDecodeError:
+        # USD quotes what it could not read, and that need not be text.
+        return "the file is not what its name or its beginning says"
+    found = _COMMENTARY.findall(text)
+    text = found[0] if found else text
     text = re.sub(r"pxrInternal_v[0-9_]+pxrReserved__(_pegtl)?::(internal::)?", "", text)
     return " ".join(text.split())
 
@@ -149,7 +171,7 @@ def _root_layer(path: str, context: Any) -> Any:
         try:
             layer = Sdf.Layer.FindOrOpen(path)
         except RuntimeError as error:
-            raise StageError(f"{path}: cannot be read as USD: {_tf_reason(error)}: export it again") from None
+            raise StageError(f"{path}: cannot be read as USD: {usd_reason(error)}: export it again") from None
     if not layer:
         raise StageError(f"{path}: is not a USD file (.usda, .usdc, .usd, .usdz), or it cannot be read: check the file")
     return layer
@@ -159,7 +181,7 @@ def _compose(open_it: Any, source: str) -> Any:
     try:
         stage = open_it()
     except RuntimeError as error:
-        raise StageError(f"{source}: cannot be composed: {_tf_reason(error)}: correct the file") from None
+        raise StageError(f"{source}: cannot be composed: {usd_reason(error)}: correct the file") from None
     if not stage:
         raise StageError(f"{source}: cannot be composed: correct the file")
     return stage
@@ -303,6 +325,8 @@ def _parse(text: str, type_name: Any, where: str) -> Any:
         read = False
     spec = layer.GetAttributeAtPath("/x.value") if read else None
     if spec is None or spec.default is None or len(layer.rootPrims) != 1 or len(layer.rootPrims[0].properties) != 1:
+        raise problem
+    if not set(spec.ListInfoKeys()) <= {"custom", "default", "typeName", "variability"}:
         raise problem
     return spec.default
 
