@@ -9,11 +9,21 @@ pub enum Law {
     /// n = A + B λ⁻² + C λ⁻⁴ + …
     Cauchy(Vec<f64>),
     /// n² = 1 + Σ Bλ²/(λ² − C)
-    Sellmeier { b: Vec<f64>, c: Vec<f64> },
+    Sellmeier {
+        b: Vec<f64>,
+        c: Vec<f64>,
+    },
     /// n² = 1 + constant + Σ Bλ²/(λ² − C²)
-    SellmeierSquared { constant: f64, b: Vec<f64>, c: Vec<f64> },
+    SellmeierSquared {
+        constant: f64,
+        b: Vec<f64>,
+        c: Vec<f64>,
+    },
     /// Cauchy law through n_d with the Abbe number V_d.
-    AbbeNumber { nd: f64, vd: f64 },
+    AbbeNumber {
+        nd: f64,
+        vd: f64,
+    },
     /// n_d + factor (n − n_d)
     Scaled(Box<Law>, f64),
 }
@@ -29,10 +39,7 @@ impl Law {
 
     /// Schott SF66, a very dispersive flint.
     pub fn sf66() -> Self {
-        Self::Sellmeier {
-            b: vec![2.0784223, 0.407120032, 1.76711292],
-            c: vec![0.0180875134, 0.0679493572, 215.266127],
-        }
+        Self::Sellmeier { b: vec![2.0784223, 0.407120032, 1.76711292], c: vec![0.0180875134, 0.0679493572, 215.266127] }
     }
 
     /// n(λ) in f64, for the construction of cases only.
@@ -44,13 +51,26 @@ impl Law {
 /// A surface. Normals point to the side that `n_g` of the product points to.
 #[derive(Clone, Debug)]
 pub enum Surface {
-    Plane { point: DVec3, normal: DVec3 },
+    Plane {
+        point: DVec3,
+        normal: DVec3,
+    },
     /// `inward`: the normal points to the centre (a mirrored transform).
-    Sphere { center: DVec3, radius: f64, inward: bool },
+    Sphere {
+        center: DVec3,
+        radius: f64,
+        inward: bool,
+    },
     /// |A (q − c)| = 1
-    Quadric { center: DVec3, matrix: DMat3 },
+    Quadric {
+        center: DVec3,
+        matrix: DMat3,
+    },
     /// The infinite continuation of a triangle, flat or with vertex normals.
-    Triangle { corners: [DVec3; 3], normals: Option<[DVec3; 3]> },
+    Triangle {
+        corners: [DVec3; 3],
+        normals: Option<[DVec3; 3]>,
+    },
 }
 
 /// Which of the (at most two) crossings along the line.

@@ -67,7 +67,13 @@ impl Truth {
     }
 
     /// Compares one vector of the product.
-    pub fn compare(&self, name: &'static str, order: usize, value: DVec3, of: impl Fn(&Derivatives) -> &Vector) -> Finding {
+    pub fn compare(
+        &self,
+        name: &'static str,
+        order: usize,
+        value: DVec3,
+        of: impl Fn(&Derivatives) -> &Vector,
+    ) -> Finding {
         let exact = of(&self.exact);
         let reactions: Vec<f64> = self.perturbed.iter().map(|p| derivative::reaction(of(p), exact)).collect();
         finding(name, order, value, exact, &reactions)

@@ -9,8 +9,8 @@
 //!
 //! An `f64` program that rounds every quantity once solves a slightly wrong problem exactly. How far that moves a
 //! derivative v is measured, not estimated: the oracle runs again with *every* input and *every* intermediate of the
-//! chain (surface parameters, hit points, normals, momenta, coefficients of the dispersion laws and their n) multiplied
-//! by 1 ± u with u = 2⁻⁸⁰ and fixed random signs, and differentiates that chain. The reaction |v_u − v| / u is the
+//! chain (surface parameters, hit points, coefficients of the dispersion laws and their n) multiplied by 1 ± u and every
+//! direction and normal turned by about u, with u = 2⁻⁸⁰ and fixed random signs, and differentiates that chain. The reaction |v_u − v| / u is the
 //! largest over a few draws of signs. With it
 //!
 //! ```text

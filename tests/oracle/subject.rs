@@ -17,17 +17,16 @@ use abbe::{
 };
 use glam::{DMat3, DVec3};
 
-/// The product's law for an authored one.
-pub fn dispersion(law: &Law) -> Dispersion {
-    let law = match law {
+/// The product's law for an authored one; its refusal where the coefficients are no glass.
+pub fn dispersion(law: &Law) -> Result<Dispersion, String> {
+    match law {
         Law::Constant(n) => Dispersion::constant(*n),
         Law::Cauchy(coefficients) => Dispersion::cauchy(coefficients),
         Law::Sellmeier { b, c } => Dispersion::sellmeier(b, c),
         Law::SellmeierSquared { constant, b, c } => Dispersion::sellmeier_squared(*constant, b, c),
-        Law::AbbeNumber { nd, vd } => Dispersion::abbe_number(*nd, *vd),
-        Law::Scaled(inner, factor) => Ok(dispersion(inner).scaled(*factor)),
-    };
-    law.expect("cases use valid laws")
+        Law::AbbeNumber { nd, vd } => Dispersion::from_abbe_number(*nd, *vd),
+        Law::Scaled(inner, factor) => dispersion(inner)?.scaled(*factor),
+    }
 }
 
 /// The camera's ray and its screen derivatives: D = look + x·right + y·up, d = D/|D| (L = |D|, so that L d = D).
@@ -96,7 +95,7 @@ impl<C> Run<C> {
 
 impl<'a> Subject<'a> {
     pub fn new(chain: &'a Chain) -> Self {
-        Self { chain, laws: chain.media.iter().map(dispersion).collect() }
+        Self { chain, laws: chain.media.iter().map(|law| dispersion(law).expect("cases use valid laws")).collect() }
     }
 
     /// The chain's own ray.

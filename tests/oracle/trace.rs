@@ -47,6 +47,11 @@ impl Noise {
         if self.0.is_none() { value } else { Vector(value.0.map(|c| self.real(c))) }
     }
 
+    /// A unit vector, turned: each component moves by ± u of the whole.
+    fn unit(&mut self, value: Vector) -> Vector {
+        if self.0.is_none() { value } else { Vector(value.0.map(|c| self.shift(c, &Real::one()))).unit() }
+    }
+
     /// An authored number.
     fn number(&mut self, value: f64) -> Real {
         self.real(Real::new(value))
@@ -221,6 +226,7 @@ impl Tracer {
         };
         let point = affine(s.origin, s.origin_x, s.origin_y);
         let direction = affine(s.look, s.right, s.up).unit();
+        let direction = self.noise.unit(direction);
         State { point, direction, medium: chain.first_medium }
     }
 
@@ -260,15 +266,8 @@ impl Tracer {
             if let (Kind::Refraction, Action::Interface(beyond)) = (kind, event.action) {
                 state.medium = beyond;
             }
-            state.direction = self.noise.vector(out).unit();
-            return Some(Passed {
-                kind,
-                w_squared,
-                cos_i: -cos,
-                geometric_normal_used: geometric,
-                distance,
-                medium,
-            });
+            state.direction = self.noise.unit(out.unit());
+            return Some(Passed { kind, w_squared, cos_i: -cos, geometric_normal_used: geometric, distance, medium });
         }
     }
 
@@ -288,7 +287,8 @@ impl Tracer {
         };
         let (distance, n_g, n_s) = match surface {
             Surface::Plane { point, normal } => {
-                let (point, normal) = (self.noise.authored(*point), self.noise.authored(*normal).unit());
+                let (point, normal) =
+                    (self.noise.authored(*point), self.noise.unit(Vector::new(normal.to_array()).unit()));
                 let t = plane_distance(&p, &d, &point, &normal)?;
                 (t, normal.clone(), normal)
             }
@@ -347,7 +347,7 @@ impl Tracer {
             point.0[axis] = self.noise.shift(point.0[axis].clone(), &size);
         }
         state.point = point;
-        Some((distance, self.noise.vector(n_g).unit(), self.noise.vector(n_s).unit()))
+        Some((distance, self.noise.unit(n_g), self.noise.unit(n_s)))
     }
 }
 
