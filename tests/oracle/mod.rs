@@ -9,9 +9,10 @@
 //!
 //! An `f64` program that rounds every quantity once solves a slightly wrong problem exactly. How far that moves a
 //! derivative v is measured, not estimated: the oracle runs again with *every* input and *every* intermediate of the
-//! chain (surface parameters, hit points, coefficients of the dispersion laws and their n) multiplied by 1 ± u and every
-//! direction and normal turned by about u, with u = 2⁻⁸⁰ and fixed random signs, and differentiates that chain. The reaction |v_u − v| / u is the
-//! largest over a few draws of signs. With it
+//! chain (surface parameters, hit points, coefficients of the dispersion laws and their n) changed by about u of its
+//! size, and every direction and normal turned by about u, with u = 2⁻⁸⁰ and fixed random factors, and differentiates
+//! that chain. Directions are turned by u·n(λ) as well, because K and K' ⊇ n'd are rounded separately. The reaction
+//! |v_u − v| / u is the largest over a few draws. With it
 //!
 //! ```text
 //! cond(v) = max(1, |v_u − v| / (u |v|)),        error bound = tolerance · cond(v) · |v| = tolerance · max(|v|, |v_u − v| / u)

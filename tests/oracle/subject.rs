@@ -38,8 +38,7 @@ pub fn ray_start(start: &Start, x: f64, y: f64) -> RayStart {
     let (length_x, length_y) = (d.dot(start.right), d.dot(start.up));
     let (d_x, d_y) = (first(start.right), first(start.up));
     // (L d)_ab = 0 since D is linear.
-    let second = |a: DVec3, b: DVec3, d_a: DVec3, d_b: DVec3, l_a: f64, l_b: f64| {
-        let _ = b;
+    let second = |a: DVec3, d_a: DVec3, d_b: DVec3, l_a: f64, l_b: f64| {
         let l_ab = d_b.dot(a);
         -(d_b * l_a + d_a * l_b + d * l_ab) / length
     };
@@ -50,9 +49,9 @@ pub fn ray_start(start: &Start, x: f64, y: f64) -> RayStart {
         point_y: start.origin_y,
         direction_x: d_x,
         direction_y: d_y,
-        direction_xx: second(start.right, start.right, d_x, d_x, length_x, length_x),
-        direction_xy: second(start.right, start.up, d_x, d_y, length_x, length_y),
-        direction_yy: second(start.up, start.up, d_y, d_y, length_y, length_y),
+        direction_xx: second(start.right, d_x, d_x, length_x, length_x),
+        direction_xy: second(start.right, d_x, d_y, length_x, length_y),
+        direction_yy: second(start.up, d_y, d_y, length_y, length_y),
     }
 }
 
@@ -182,8 +181,9 @@ pub fn hit(surface: &Surface, root: Root, p: DVec3, d: DVec3) -> Option<(f64, DV
         Surface::Sphere { center, radius, inward } => {
             let o = p - *center;
             let t = quadratic(1.0, o, d, *radius, root)?;
-            let away = p + t * d - *center;
-            let outward = away.normalize();
+            // Not projected onto the sphere: that would round by the size of the centre, off the ray.
+            let reached = p + t * d;
+            let outward = (reached - *center).normalize();
             let sign = if *inward { -1.0 } else { 1.0 };
             let inv_radius = sign / radius;
             let n = sign * outward;
@@ -193,13 +193,13 @@ pub fn hit(surface: &Surface, root: Root, p: DVec3, d: DVec3) -> Option<(f64, DV
                 curvature: Curvature::Sphere { inv_radius },
                 field: NormalField::Sphere { inv_radius },
             };
-            Some((t, *center + outward * *radius, local))
+            Some((t, reached, local))
         }
         Surface::Quadric { center, matrix } => {
             let (o, u) = (*matrix * (p - *center), *matrix * d);
             let t = quadratic(u.length(), o, u, 1.0, root)?;
-            let away = p + t * d - *center;
-            let away = away / (*matrix * away).length();
+            let reached = p + t * d;
+            let away = reached - *center;
             let hessian = 2.0 * matrix.transpose().mul_mat3(matrix);
             let gradient = hessian * away;
             let length = gradient.length();
@@ -210,7 +210,7 @@ pub fn hit(surface: &Surface, root: Root, p: DVec3, d: DVec3) -> Option<(f64, DV
                 curvature: Curvature::Quadric { hessian: hessian * (1.0 / length) },
                 field: NormalField::Linear { vector: gradient, gradient: hessian },
             };
-            Some((t, *center + away, local))
+            Some((t, reached, local))
         }
         Surface::Triangle { corners: [a, b, c], normals } => {
             let (e1, e2) = (*b - *a, *c - *a);

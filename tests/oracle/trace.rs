@@ -14,7 +14,7 @@ pub fn ior(law: &Law, nanometers: &Real) -> Real {
     Noise::none().ior(law, nanometers)
 }
 
-/// Multiplies what passes through it by 1 ± u, or leaves it alone.
+/// Perturbs what passes through it by about u = 2⁻⁸⁰ of its size, or leaves it alone.
 #[derive(Clone, Debug)]
 pub struct Noise(Option<Random>);
 
@@ -27,14 +27,15 @@ impl Noise {
         Self(Some(Random::new(seed)))
     }
 
-    /// value ± u·size
+    /// value + e·u·size with a random e of magnitude ½ to 1½. (Signs alone would often cancel where two quantities, the
+    /// centre and the radius of a large sphere, nearly compensate each other.)
     fn shift(&mut self, value: Real, size: &Real) -> Real {
         match &mut self.0 {
             None => value,
             Some(random) => {
                 let u = Real::power_of_two(PERTURBATION_EXPONENT);
-                let change = &(size * &u);
-                if random.bits() & 1 == 0 { value + change } else { value - change }
+                let e = random.range(-1.0, 1.0);
+                value + size * &u * Real::new(e + e.signum() * 0.5)
             }
         }
     }
@@ -47,9 +48,19 @@ impl Noise {
         if self.0.is_none() { value } else { Vector(value.0.map(|c| self.real(c))) }
     }
 
-    /// A unit vector, turned: each component moves by ± u of the whole.
+    /// A unit vector, turned: each component moves by about u of the whole.
     fn unit(&mut self, value: Vector) -> Vector {
         if self.0.is_none() { value } else { Vector(value.0.map(|c| self.shift(c, &Real::one()))).unit() }
+    }
+
+    /// The direction of a ray in a medium of this index, turned by about u and, independently, by u·n(λ): whoever
+    /// carries K and its derivatives rounds each relative to itself, and K' ⊇ n'd.
+    fn direction(&mut self, value: Vector, ior: &Real) -> Vector {
+        if self.0.is_none() {
+            return value;
+        }
+        let turned = self.unit(value);
+        Vector(turned.0.map(|c| self.shift(c, ior))).unit()
     }
 
     /// An authored number.
@@ -226,7 +237,7 @@ impl Tracer {
         };
         let point = affine(s.origin, s.origin_x, s.origin_y);
         let direction = affine(s.look, s.right, s.up).unit();
-        let direction = self.noise.unit(direction);
+        let direction = self.noise.direction(direction, &self.media[chain.first_medium]);
         State { point, direction, medium: chain.first_medium }
     }
 
@@ -266,7 +277,7 @@ impl Tracer {
             if let (Kind::Refraction, Action::Interface(beyond)) = (kind, event.action) {
                 state.medium = beyond;
             }
-            state.direction = self.noise.unit(out.unit());
+            state.direction = self.noise.direction(out.unit(), &self.media[state.medium]);
             return Some(Passed { kind, w_squared, cos_i: -cos, geometric_normal_used: geometric, distance, medium });
         }
     }
