@@ -1,0 +1,2 @@
+"""x"""
+from abbe._core import __version__
