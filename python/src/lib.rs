@@ -8,6 +8,8 @@ mod error;
 mod film;
 mod json;
 mod memory;
+mod optics;
+mod scene;
 
 /// The compiled half of the package `abbe`.
 #[pymodule]
@@ -19,6 +21,10 @@ mod _core {
 
     #[pymodule_export]
     use crate::film::PyFilm;
+    #[pymodule_export]
+    use crate::optics::{PyDispersion, reflect, refract, transfer};
+    #[pymodule_export]
+    use crate::scene::PyScene;
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -35,6 +41,20 @@ mod _core {
     #[pyfunction]
     fn aov_aliases() -> std::collections::BTreeMap<&'static str, &'static str> {
         abbe::film::aov::ALIASES.iter().copied().collect()
+    }
+
+    /// The integrators that can be chosen: dicts with name, summary and the names of their aovs.
+    #[pyfunction]
+    fn integrators(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+        let registry = abbe::integrator::Registry::default();
+        let rows: Vec<_> = registry
+            .iter()
+            .map(|integrator| {
+                let aovs: Vec<_> = integrator.aovs().iter().map(|aov| aov.name).collect();
+                serde_json::json!({ "name": integrator.name(), "summary": integrator.summary(), "aovs": aovs })
+            })
+            .collect();
+        json::to_python(py, &rows)
     }
 
     /// Joins crops and aligned sample ranges of one render into one file: the same bits as rendering in one go.
