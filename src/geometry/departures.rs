@@ -74,8 +74,7 @@ impl Departures {
             self.crossings.copy_within(1.., 0);
             self.len -= 1;
         }
-        self.crossings[usize::from(self.len)] =
-            Crossing { instance: hit.instance, primitive: hit.primitive, outward };
+        self.crossings[usize::from(self.len)] = Crossing { instance: hit.instance, primitive: hit.primitive, outward };
         self.len += 1;
     }
 

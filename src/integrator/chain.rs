@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use crate::geometry::{Departures, Hit, Ray};
 use crate::optics::IorJet;
-use crate::optics::media::MediaStack;
+use crate::optics::media::{Inside, MediaStack};
 use crate::ray::{ColumnSet, LocalSurface, RayStart, ScatterKind, Scattering, Step, Transfer};
 use crate::ray::{critical_distance, mirror, refract_or_reflect};
 use crate::scene::material::Kind;
@@ -183,8 +183,7 @@ impl<'a> Follower<'a> {
             is_dispersive: false,
             nearest_critical: f64::INFINITY,
         };
-        let columns_carried =
-            u64::from(C::LAMBDA) + 2 * u64::from(C::SCREEN) + u64::from(C::SECOND);
+        let columns_carried = u64::from(C::LAMBDA) + 2 * u64::from(C::SCREEN) + u64::from(C::SECOND);
         let mut momentum = medium.ior * start.direction;
         if let Some(log) = log.as_deref_mut() {
             log.clear();
@@ -350,9 +349,7 @@ impl<'a> Walk<'a> {
                 self.cross(met);
                 Event::Straight { is_interface: false, rough: false }
             }
-            Kind::Mirror => {
-                Event::Scattered { scattering: mirror(momentum, &met.surface, medium), rough: false }
-            }
+            Kind::Mirror => Event::Scattered { scattering: mirror(momentum, &met.surface, medium), rough: false },
             &Kind::Dielectric { thin_walled: true, rough, .. } => {
                 self.cross(met);
                 Event::Straight { is_interface: true, rough }
@@ -363,9 +360,9 @@ impl<'a> Walk<'a> {
                 let next = if met.hit.leaving {
                     self.media.preview_leave(&inside)
                 } else {
-                    Some(self.media.preview_enter(&inside))
+                    Ok(self.media.preview_enter(&inside))
                 };
-                let Some(next) = next else {
+                let Ok(next) = next else {
                     counters.unmatched_exits += 1;
                     self.cross(met);
                     return Event::Straight { is_interface: false, rough: false };
@@ -385,7 +382,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn change_media(&mut self, met: &SurfacePoint, inside: crate::optics::media::Inside) {
+    fn change_media(&mut self, met: &SurfacePoint, inside: Inside) {
         if met.hit.leaving {
             self.media.leave(&inside);
         } else {

@@ -11,6 +11,7 @@ use super::{Columns, Integrator, PreparedIntegrator, Task, Worker};
 use crate::error::Result;
 use crate::film::aov::{AOVS, Aov, Family};
 use crate::film::pixel::PixelAccumulator;
+use crate::optics::IorJet;
 use crate::ray::{
     ColumnSet, LambdaColumn, NoColumns, RayStart, ScreenColumns, SecondOrderColumns, Step, direction_derivative,
     direction_second_derivative, half_width, screen_motion, second_order_along,
@@ -36,7 +37,7 @@ impl Integrator for Differentials {
     }
 
     fn prepare<'a>(&self, task: &'a Task<'a>) -> Result<Box<dyn PreparedIntegrator + 'a>> {
-        Ok(Box::new(Prepared::new(task)))
+        Ok(Box::new(Prepared::new(task)?))
     }
 }
 
@@ -125,17 +126,18 @@ struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    fn new(task: &'a Task<'a>) -> Self {
+    fn new(task: &'a Task<'a>) -> Result<Self> {
         let scene = task.view.scene;
         let media = |wavelength| Media::at(scene, wavelength, task.optics.dispersion_scale);
-        Self {
+        let channels: &[_] = if task.needs.retrace { &task.optics.channels } else { &[] };
+        Ok(Self {
             task,
             follower: Follower::new(task.view),
-            media: media(task.optics.reference),
-            channel_media: if task.needs.retrace { task.optics.channels.map(media).into() } else { Vec::new() },
+            media: media(task.optics.reference)?,
+            channel_media: channels.iter().map(|&wavelength| media(wavelength)).collect::<Result<_>>()?,
             outputs: task.aovs.iter().map(|aov| Output::of(aov)).collect(),
             needs_first: task.aovs.iter().any(|aov| aov.family == Family::FirstSurface),
-        }
+        })
     }
 }
 
@@ -144,9 +146,15 @@ impl PreparedIntegrator for Prepared<'_> {
         let counters = Counters::default();
         let log = Vec::new();
         match self.task.needs.columns {
-            Columns::None => Box::new(Carrier::<NoColumns> { prepared: self, counters, log, columns: Default::default() }),
-            Columns::Lambda => Box::new(Carrier::<LambdaColumn> { prepared: self, counters, log, columns: Default::default() }),
-            Columns::Screen => Box::new(Carrier::<ScreenColumns> { prepared: self, counters, log, columns: Default::default() }),
+            Columns::None => {
+                Box::new(Carrier::<NoColumns> { prepared: self, counters, log, columns: Default::default() })
+            }
+            Columns::Lambda => {
+                Box::new(Carrier::<LambdaColumn> { prepared: self, counters, log, columns: Default::default() })
+            }
+            Columns::Screen => {
+                Box::new(Carrier::<ScreenColumns> { prepared: self, counters, log, columns: Default::default() })
+            }
             Columns::SecondOrder => {
                 Box::new(Carrier::<SecondOrderColumns> { prepared: self, counters, log, columns: Default::default() })
             }
@@ -223,7 +231,7 @@ impl<C: ColumnSet> Carrier<'_, C> {
                 Output::AbbeNumber => {
                     let scale = task.optics.dispersion_scale;
                     let number = sample.dielectric().and_then(|kind| match kind {
-                        Kind::Dielectric { dispersion, .. } => dispersion.scaled(scale).abbe_number(),
+                        Kind::Dielectric { dispersion, .. } => dispersion.scaled(scale).ok()?.abbe_number(),
                         _ => None,
                     });
                     out.add(layer, scalar(number));
@@ -233,7 +241,13 @@ impl<C: ColumnSet> Carrier<'_, C> {
                 Output::TotalReflections => out.add_first(layer, chain.total_reflections),
                 Output::Surface(value, Whose::First) => self.surface_value(value, layer, &start, first, out),
                 Output::Surface(value, Whose::Chain) => {
-                    self.surface_value(value, layer, &RayStart { direction: chain.direction, ..start }, end_surface, out);
+                    self.surface_value(
+                        value,
+                        layer,
+                        &RayStart { direction: chain.direction, ..start },
+                        end_surface,
+                        out,
+                    );
                 }
             }
         }
@@ -276,7 +290,13 @@ impl<C: ColumnSet> Carrier<'_, C> {
     /// Exact displacement at a channel's wavelength as a fetch offset: what is seen at `raster` there, is seen at
     /// `raster` + offset at the reference wavelength. Newton's method with the screen columns, started from the
     /// first-order motion, until a step no longer changes the offset.
-    fn fetch_offset(&mut self, raster: [f64; 2], start: &RayStart, sample: &Sample<'_, C>, channel: usize) -> Option<DVec2> {
+    fn fetch_offset(
+        &mut self,
+        raster: [f64; 2],
+        start: &RayStart,
+        sample: &Sample<'_, C>,
+        channel: usize,
+    ) -> Option<DVec2> {
         /// Newton doubles the digits at each step: eight reach the last one from any start that converges at all.
         const MAX_STEPS: usize = 8;
         /// Where steps below this many pixels stop to shrink is decided by rounding of the hit point: a thousandth of
@@ -451,13 +471,7 @@ impl<C: ColumnSet> Sample<'_, C> {
         self.motion().filter(|motion| motion.length_squared() <= width * width + height * height)
     }
 
-    fn motion2(
-        &self,
-        start: &RayStart,
-        start_medium: crate::optics::IorJet,
-        log: &[Step],
-        counters: &mut Counters,
-    ) -> Option<DVec2> {
+    fn motion2(&self, start: &RayStart, start_medium: IorJet, log: &[Step], counters: &mut Counters) -> Option<DVec2> {
         let motion = self.visible_motion()?;
         if !self.chain.is_dispersive {
             return Some(DVec2::ZERO);

@@ -31,7 +31,10 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
     let [r, g, b] = plan.optics.channels.map(nm);
     set("abbe:channelWavelengths", Attribute::Text(format!("R {r} nm, G {g} nm, B {b} nm")));
     set("abbe:dispersionScale", Attribute::Double(plan.optics.dispersion_scale));
-    set("abbe:axes", text("pixel vectors: +x right, +y up, full-raster pixels; vectors and positions: the stage's world"));
+    set(
+        "abbe:axes",
+        text("pixel vectors: +x right, +y up, full-raster pixels; vectors and positions: the stage's world"),
+    );
     set(
         "abbe:sign",
         text(
@@ -55,7 +58,8 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
             set(&format!("abbe:aov:{}", layer.name), text(layer.aov.name));
         }
     }
-    let has_ids = |what: &str| plan.layers.iter().any(|layer| layer.aov.merge == Merge::First && layer.aov.name.contains(what));
+    let has_ids =
+        |what: &str| plan.layers.iter().any(|layer| layer.aov.merge == Merge::First && layer.aov.name.contains(what));
     for (name, paths, wanted) in [
         ("abbe:primManifest", &scene.prims, has_ids("prim_id")),
         ("abbe:instanceManifest", &scene.instances, has_ids("instance_id")),

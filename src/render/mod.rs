@@ -225,7 +225,10 @@ fn empty_film(plan: &Plan, camera: &Camera) -> Result<Film> {
     let pixels = plan.window.area();
     let channels: usize = plan.layers.iter().map(|layer| layer.aov.channels.len() + 1).sum();
     if pixels.checked_mul(channels).is_none_or(|n| n > MAX_VALUES) {
-        return Err(Error::usage("--width", format!("{pixels} pixels of {channels} channels are too many: render crops")));
+        return Err(Error::usage(
+            "--width",
+            format!("{pixels} pixels of {channels} channels are too many: render crops"),
+        ));
     }
     let mut probe: Vec<f32> = Vec::new();
     probe.try_reserve_exact(pixels * channels).map_err(|_| {

@@ -120,7 +120,10 @@ pub fn plan(scene: &Scene, request: &Request, registry: &Registry) -> Result<Vec
         let Some(product) = settings.products.iter().find(|p| p.path == *wanted) else {
             let known: Vec<_> = settings.products.iter().map(|p| p.path.as_str()).collect();
             let known = if known.is_empty() { "the stage has none".to_owned() } else { known.join(", ") };
-            return Err(Error::usage(format!("--product {wanted}"), format!("there is no such RenderProduct: {known}")));
+            return Err(Error::usage(
+                format!("--product {wanted}"),
+                format!("there is no such RenderProduct: {known}"),
+            ));
         };
         return Ok(vec![plan_product(scene, request, registry, Some(product))?]);
     }
@@ -142,7 +145,10 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let conform_policy = ConformPolicy::from_token(policy).ok_or_else(|| {
         Error::scene(product_place(product), format!("unknown aspectRatioConformPolicy '{policy}': use expandAperture"))
     })?;
-    if authored_camera.f_stop > 0.0 && authored_camera.focus_distance > 0.0 && !product.is_some_and(|p| p.disable_depth_of_field) {
+    if authored_camera.f_stop > 0.0
+        && authored_camera.focus_distance > 0.0
+        && !product.is_some_and(|p| p.disable_depth_of_field)
+    {
         diagnostics.warn(
             "depth-of-field",
             &camera_path,
@@ -170,11 +176,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     {
         return Err(Error::scene(warning.places[0].as_str(), format!("{} (--strict)", warning.message)));
     }
-    let materials = scene
-        .materials
-        .iter()
-        .map(|m| Decision { what: m.path.clone(), why: m.chosen.clone() })
-        .collect();
+    let materials = scene.materials.iter().map(|m| Decision { what: m.path.clone(), why: m.chosen.clone() }).collect();
     Ok(Plan {
         product: product.map(|p| p.path.clone()).unwrap_or_default(),
         output: product.map(|p| p.name.clone()).unwrap_or_default(),
@@ -211,21 +213,23 @@ fn choose_camera(scene: &Scene, request: &Request, product: Option<&Product>) ->
             .position(|c| c.path == *wanted || c.path.rsplit('/').next() == Some(wanted.as_str()))
             .ok_or_else(|| {
                 let known: Vec<_> = cameras.iter().map(|c| c.path.as_str()).collect();
-                Error::usage(format!("--camera {wanted}"), format!("the scene has no such camera: {}", known.join(", ")))
+                Error::usage(
+                    format!("--camera {wanted}"),
+                    format!("the scene has no such camera: {}", known.join(", ")),
+                )
             })?,
         None => product.and_then(|p| p.camera).unwrap_or(0),
     };
     let camera = cameras.get(index).ok_or_else(|| {
-        Error::scene(product_place(product), format!("camera {index} of {} does not exist: export the stage again", cameras.len()))
+        Error::scene(
+            product_place(product),
+            format!("camera {index} of {} does not exist: export the stage again", cameras.len()),
+        )
     })?;
     Ok((index, camera.path.clone()))
 }
 
-fn choose_resolution(
-    request: &Request,
-    product: Option<&Product>,
-    camera: &description::Camera,
-) -> Result<[u32; 2]> {
+fn choose_resolution(request: &Request, product: Option<&Product>, camera: &description::Camera) -> Result<[u32; 2]> {
     let authored = match product.and_then(|p| p.resolution) {
         Some([w, h]) => {
             let side = |v: i64| u32::try_from(v).ok().filter(|&v| v > 0 && v <= MAX_SIDE);
@@ -244,7 +248,8 @@ fn choose_resolution(
             return Err(Error::usage(flag, format!("must be 1 to {MAX_SIDE} pixels, not {}", value.unwrap_or(0))));
         }
     }
-    let aspect = authored.map_or(camera.horizontal_aperture / camera.vertical_aperture, |[w, h]| f64::from(w) / f64::from(h));
+    let aspect =
+        authored.map_or(camera.horizontal_aperture / camera.vertical_aperture, |[w, h]| f64::from(w) / f64::from(h));
     // The height is cut off, as usdrecord does, but never to nothing.
     let side = |v: f64| if v.is_finite() { (v.floor() as u32).clamp(1, MAX_SIDE) } else { 1 };
     Ok(match (request.width, request.height, authored) {
@@ -260,7 +265,10 @@ fn choose_window(request: &Request, product: Option<&Product>, resolution: [u32;
     let full = Window::full(resolution);
     if let Some([x0, y0, x1, y1]) = request.crop {
         if x0 >= x1 || y0 >= y1 {
-            return Err(Error::usage("--crop", format!("({x0}, {y0}) to ({x1}, {y1}) holds no pixel: X0,Y0,X1,Y1 are half-open, y down")));
+            return Err(Error::usage(
+                "--crop",
+                format!("({x0}, {y0}) to ({x1}, {y1}) holds no pixel: X0,Y0,X1,Y1 are half-open, y down"),
+            ));
         }
         let limit = MAX_SIDE as i32;
         if [x0, y0, x1, y1].iter().any(|v| v.abs() > limit) {
@@ -276,9 +284,13 @@ fn choose_window(request: &Request, product: Option<&Product>, resolution: [u32;
     // A pixel is inside when its centre is; NDC counts y from the bottom.
     let first = |ndc: f64, side: u32| (ndc * f64::from(side) - 0.5).ceil() as i32;
     let [w, h] = resolution;
-    let window = Window { x0: first(x_min, w), y0: first(1.0 - y_max, h), x1: first(x_max, w), y1: first(1.0 - y_min, h) };
+    let window =
+        Window { x0: first(x_min, w), y0: first(1.0 - y_max, h), x1: first(x_max, w), y1: first(1.0 - y_min, h) };
     if window.area() == 0 {
-        return Err(Error::scene(format!("{}.dataWindowNDC", product.path), "holds no pixel: min must be less than max"));
+        return Err(Error::scene(
+            format!("{}.dataWindowNDC", product.path),
+            "holds no pixel: min must be less than max",
+        ));
     }
     Ok(window)
 }
@@ -357,7 +369,10 @@ fn choose_layers(
 ) -> Result<(String, Vec<PlannedLayer>)> {
     let chosen = match &request.integrator {
         Some(name) => name.clone(),
-        None => attributes.text("abbe:integrator")?.filter(|name| !name.is_empty()).unwrap_or_else(|| "differentials".to_owned()),
+        None => attributes
+            .text("abbe:integrator")?
+            .filter(|name| !name.is_empty())
+            .unwrap_or_else(|| "differentials".to_owned()),
     };
     let offered = registry.find(&chosen)?.aovs();
     let find = |name: &str| {
@@ -404,7 +419,10 @@ fn choose_layers(
         if let Some(other) = layers.iter().find(|layer: &&PlannedLayer| layer.name == name) {
             return Err(Error::scene(
                 &var.path,
-                format!("its layer '{name}' is also that of '{}': give it another driver:parameters:aov:name", other.aov.name),
+                format!(
+                    "its layer '{name}' is also that of '{}': give it another driver:parameters:aov:name",
+                    other.aov.name
+                ),
             ));
         }
         layers.push(PlannedLayer { aov, name });
@@ -490,8 +508,16 @@ fn reasons(
         list.push(Decision { what: what.to_owned(), why });
     };
     use Family::{Chain, FirstSurface, LambdaColumn, LambdaSecondOrder, Retrace, ScreenColumns, ScreenSecondOrder};
-    decide("wavelength column ∂λ", needs.columns >= Columns::Lambda, &[LambdaColumn, LambdaSecondOrder, ScreenColumns, ScreenSecondOrder]);
-    decide("screen columns ∂x, ∂y", needs.columns >= Columns::Screen, &[ScreenColumns, ScreenSecondOrder, LambdaSecondOrder]);
+    decide(
+        "wavelength column ∂λ",
+        needs.columns >= Columns::Lambda,
+        &[LambdaColumn, LambdaSecondOrder, ScreenColumns, ScreenSecondOrder],
+    );
+    decide(
+        "screen columns ∂x, ∂y",
+        needs.columns >= Columns::Screen,
+        &[ScreenColumns, ScreenSecondOrder, LambdaSecondOrder],
+    );
     decide("second order ∂²λ", needs.columns >= Columns::SecondOrder, &[LambdaSecondOrder]);
     decide("second chain along the screen motion", needs.second_chain, &[ScreenSecondOrder]);
     decide("re-trace at the R, G, B wavelengths", needs.retrace, &[Retrace]);
@@ -499,16 +525,23 @@ fn reasons(
         let list = if computed { &mut carried } else { &mut skipped };
         list.push(Decision { what: what.to_owned(), why });
     };
-    let chain_asked =
-        asked(&[Chain, LambdaColumn, LambdaSecondOrder, ScreenColumns, ScreenSecondOrder, Retrace]);
+    let chain_asked = asked(&[Chain, LambdaColumn, LambdaSecondOrder, ScreenColumns, ScreenSecondOrder, Retrace]);
     if needs.chain {
         note(true, "specular chain", format!("{} tells about it", chain_asked.join(", ")));
     } else {
-        note(false, "specular chain", format!("only the first surface is asked for ({})", asked(&[FirstSurface]).join(", ")));
+        note(
+            false,
+            "specular chain",
+            format!("only the first surface is asked for ({})", asked(&[FirstSurface]).join(", ")),
+        );
     }
     let uv = layers.iter().any(|layer| layer.aov.name.ends_with("uv"));
     note(uv, "texture coordinates", if uv { "uv is asked for".into() } else { "no AOV asks for them".into() });
-    note(false, "light sampling, emission, textures", format!("the integrator '{}' has no use for them", integrator.name()));
+    note(
+        false,
+        "light sampling, emission, textures",
+        format!("the integrator '{}' has no use for them", integrator.name()),
+    );
     for (reason, count) in &scene.skipped {
         note(false, reason, format!("{count} left out by the bridge"));
     }
@@ -537,7 +570,11 @@ impl<'a> Attributes<'a> {
             if let Some(authored) = self.get(name) {
                 let value = authored.value.as_str().map_or_else(|| authored.value.to_string(), str::to_owned);
                 if value != *harmless && value != format!("{harmless}.0") {
-                    diagnostics.warn("unused-setting", format!("render settings, {name}"), format!("is {value}, but {message}"));
+                    diagnostics.warn(
+                        "unused-setting",
+                        format!("render settings, {name}"),
+                        format!("is {value}, but {message}"),
+                    );
                 }
             }
         }
@@ -610,7 +647,9 @@ impl fmt::Display for Plan {
         )?;
         let names: Vec<_> = self.layers.iter().map(|layer| layer.aov.name).collect();
         writeln!(f, "layers       {}", names.join(", "))?;
-        for (title, decisions) in [("carried", &self.carried), ("skipped", &self.skipped), ("materials", &self.materials)] {
+        for (title, decisions) in
+            [("carried", &self.carried), ("skipped", &self.skipped), ("materials", &self.materials)]
+        {
             writeln!(f, "{title}")?;
             for decision in decisions {
                 writeln!(f, "  {}: {}", decision.what, decision.why)?;

@@ -18,15 +18,14 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
     }
     let camera = super::camera(scene, plan)?;
     let view = View::new(scene, camera.position);
-    let media = Media::at(scene, plan.optics.reference, plan.optics.dispersion_scale);
+    let media = Media::at(scene, plan.optics.reference, plan.optics.dispersion_scale)?;
     let follower = Follower::new(&view);
     let [dx, dy] = Sampler::new(plan.samples.total, plan.seed)?.position(pixel, sample);
     let raster = [f64::from(pixel[0]) + dx, f64::from(pixel[1]) + dy];
     let start = camera.ray(raster[0], raster[1]);
     let medium = follower.start_medium(&media);
     let mut log = Vec::new();
-    let chain: Chain<SecondOrderColumns> =
-        follower.follow(&start, &media, Some(&mut log), &mut Counters::default());
+    let chain: Chain<SecondOrderColumns> = follower.follow(&start, &media, Some(&mut log), &mut Counters::default());
 
     let mut columns = SecondOrderColumns::start(&start, &medium);
     let mut point = start.point;

@@ -10,7 +10,7 @@ use glam::{DAffine3, DMat4};
 use rayon::prelude::*;
 
 use super::description::{self, Array, Description, Document, Element, Group, Placement, Target};
-use super::material::{self, Kind, Material};
+use super::material::{self, Kind, Material, ScalarIor};
 use super::{Counts, Object, Scene};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
@@ -132,7 +132,10 @@ fn check_groups(document: &Document) -> Result<()> {
         if index < length {
             return Ok(());
         }
-        Err(Error::scene(place, format!("refers to {what} {index} of {length}: the scene file is damaged, export it again")))
+        Err(Error::scene(
+            place,
+            format!("refers to {what} {index} of {length}: the scene file is damaged, export it again"),
+        ))
     };
     in_range(document.root, document.groups.len(), &document.stage.source, "group")?;
     for group in &document.groups {
@@ -169,10 +172,7 @@ fn check_groups(document: &Document) -> Result<()> {
                     State::Open => {
                         return Err(Error::scene(
                             &item.path,
-                            format!(
-                                "instances {}, which contains it: break the cycle",
-                                document.groups[child].path
-                            ),
+                            format!("instances {}, which contains it: break the cycle", document.groups[child].path),
                         ));
                     }
                     State::Counted(_) => {}
@@ -216,12 +216,8 @@ fn unroll<'a>(document: &'a Document, diagnostics: &mut Diagnostics) -> Result<V
         instance: Option<&'a str>,
     }
     let mut placed = Vec::new();
-    let mut stack = vec![Frame {
-        group: &document.groups[document.root],
-        next: 0,
-        transform: DAffine3::IDENTITY,
-        instance: None,
-    }];
+    let mut stack =
+        vec![Frame { group: &document.groups[document.root], next: 0, transform: DAffine3::IDENTITY, instance: None }];
     while let Some(mut frame) = stack.pop() {
         let Some(item) = frame.group.items.get(frame.next) else { continue };
         frame.next += 1;
@@ -329,10 +325,7 @@ fn report_mesh(mesh: &description::Mesh, report: &MeshReport, diagnostics: &mut 
     }
 }
 
-fn build_shape(
-    description: &Description,
-    shape: &description::Shape,
-) -> Result<(Arc<Shape>, Option<MeshReport>)> {
+fn build_shape(description: &Description, shape: &description::Shape) -> Result<(Arc<Shape>, Option<MeshReport>)> {
     match shape {
         description::Shape::Sphere { path, radius } => {
             let sphere = Sphere::new(*radius).ok_or_else(|| {
@@ -345,8 +338,11 @@ fn build_shape(
             let hole_indices = mesh.hole_indices.as_deref().map(|name| arrays.integers(name)).transpose()?;
             let counts = arrays.integers(&mesh.face_vertex_counts)?;
             let indices = arrays.integers(&mesh.face_vertex_indices)?;
-            let subsets =
-                mesh.subsets.iter().map(|s| Ok((s.path.as_str(), arrays.integers(&s.faces)?))).collect::<Result<Vec<_>>>()?;
+            let subsets = mesh
+                .subsets
+                .iter()
+                .map(|s| Ok((s.path.as_str(), arrays.integers(&s.faces)?)))
+                .collect::<Result<Vec<_>>>()?;
             let polygons = PolygonMesh {
                 path: &mesh.path,
                 points: arrays.buffer(&mesh.points, 3)?,
@@ -378,9 +374,13 @@ impl<'a> MeshArrays<'a> {
             .arrays
             .get(name)
             .ok_or_else(|| Error::scene(place, format!("its array '{name}' is missing: export the stage again")))?;
-        let expected = if columns == 1 { array.shape.len() == 1 } else { array.shape.len() == 2 && array.shape[1] == columns };
+        let expected =
+            if columns == 1 { array.shape.len() == 1 } else { array.shape.len() == 2 && array.shape[1] == columns };
         let elements = array.shape.iter().try_fold(1usize, |n, &k| n.checked_mul(k));
-        if array.element != element || !expected || elements.map(|n| n.saturating_mul(element.size())) != Some(array.bytes.len()) {
+        if array.element != element
+            || !expected
+            || elements.map(|n| n.saturating_mul(element.size())) != Some(array.bytes.len())
+        {
             return Err(Error::scene(
                 place,
                 format!(
@@ -402,7 +402,10 @@ impl<'a> MeshArrays<'a> {
     fn integers(&self, name: &str) -> Result<&'a [i32]> {
         let array = self.get(name, Element::I32, 1)?;
         bytemuck::try_cast_slice(&array.bytes).map_err(|_| {
-            Error::scene(&self.mesh.path, format!("array '{name}' is not aligned to its elements: write the file again"))
+            Error::scene(
+                &self.mesh.path,
+                format!("array '{name}' is not aligned to its elements: write the file again"),
+            )
         })
     }
 
@@ -437,7 +440,7 @@ fn build_materials(
     let mut ids = vec![0; document.materials.len()];
     for (i, authored) in document.materials.iter().enumerate() {
         if used[i] {
-            materials.push(material::compile(authored, diagnostics)?);
+            materials.push(material::compile(authored, ScalarIor::default(), diagnostics)?);
             ids[i] = materials.len() as u32;
         }
     }

@@ -90,7 +90,8 @@ pub fn parse(bytes: &Bytes, place: &str) -> Result<Description> {
     let mut arrays = BTreeMap::new();
     for (name, view) in tensors.iter() {
         if name == DOCUMENT {
-            json = Some(std::str::from_utf8(view.data()).map_err(|_| Error::scene(place, "its document is not UTF-8"))?);
+            json =
+                Some(std::str::from_utf8(view.data()).map_err(|_| Error::scene(place, "its document is not UTF-8"))?);
             continue;
         }
         let element = match view.dtype() {
@@ -104,7 +105,10 @@ pub fn parse(bytes: &Bytes, place: &str) -> Result<Description> {
         arrays.insert(name.to_owned(), Array { element, shape, bytes: bytes.slice_ref(view.data()) });
     }
     let json = json.ok_or_else(|| {
-        Error::scene(place, format!("has no '{DOCUMENT}': it is a safetensors file, but not a scene written by `abbe export`"))
+        Error::scene(
+            place,
+            format!("has no '{DOCUMENT}': it is a safetensors file, but not a scene written by `abbe export`"),
+        )
     })?;
     Description::from_json(json, arrays, place)
 }
@@ -123,9 +127,9 @@ fn load(path: &Path, mut file: File) -> Result<Bytes> {
     let length = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
     let length = usize::try_from(length).map_err(|_| Error::file(path, "is larger than the address space"))?;
     let mut words = Vec::new();
-    words
-        .try_reserve_exact(length.div_ceil(8))
-        .map_err(|_| Error::file(path, format!("needs {length} bytes of memory, more than there is: map it instead")))?;
+    words.try_reserve_exact(length.div_ceil(8)).map_err(|_| {
+        Error::file(path, format!("needs {length} bytes of memory, more than there is: map it instead"))
+    })?;
     words.resize(length.div_ceil(8), 0u64);
     file.read_exact(&mut bytemuck::cast_slice_mut(&mut words)[..length]).map_err(|e| Error::io(path, "read", e))?;
     Ok(Bytes::from_owner(Owner { words, length }))

@@ -154,7 +154,7 @@ fn dispersion(
     let (law, source) = if let Some(stated) = authored.law(glass.ior, diagnostics)? {
         (stated.dispersion, stated.source)
     } else if let Some(abbe_number) = glass.abbe_number {
-        let law = Dispersion::abbe_number(glass.ior, abbe_number).map_err(at("inputs"))?;
+        let law = Dispersion::from_abbe_number(glass.ior, abbe_number).map_err(at("inputs"))?;
         (law, format!("{} of {}, n_d from {}", glass.abbe_source, shader.id, glass.ior_source))
     } else {
         let ScalarIor::Constant = scalar_ior;

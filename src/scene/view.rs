@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::Scene;
 use super::material::{Kind, Material};
+use crate::error::{Error, Result};
 use crate::geometry::{Aggregate, Departures, Hit, Instance, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
@@ -108,12 +109,17 @@ pub struct Media {
 
 impl Media {
     /// At `wavelength`, with the dispersion of every medium scaled by `scale` (1 physical, 0 none).
-    pub fn at(scene: &Scene, wavelength: Wavelength, scale: f64) -> Self {
+    ///
+    /// Refuses a scale under which a medium has no index.
+    pub fn at(scene: &Scene, wavelength: Wavelength, scale: f64) -> Result<Self> {
         let jet = |material: &Material| match &material.kind {
-            Kind::Dielectric { dispersion, .. } => dispersion.scaled(scale).at(wavelength),
-            _ => IorJet::VACUUM,
+            Kind::Dielectric { dispersion, .. } => {
+                let scaled = dispersion.scaled(scale).map_err(|problem| Error::scene(&material.path, problem))?;
+                Ok(scaled.at(wavelength))
+            }
+            _ => Ok(IorJet::VACUUM),
         };
-        Self { jets: scene.materials.iter().map(jet).collect() }
+        Ok(Self { jets: scene.materials.iter().map(jet).collect::<Result<_>>()? })
     }
 
     /// Of `medium`; 1 outside everything.

@@ -201,7 +201,11 @@ impl<'a> Surface<'a> {
         let metalness = self.metalness(metalness_name, default_metalness)?;
         if transmission * (1.0 - metalness) >= THRESHOLD {
             let (rough, thin_walled) = (self.is_rough(diagnostics)?, self.is_thin_walled(diagnostics)?);
-            return Ok(Response::Transmissive { why: format!("{transmission_name} {transmission}"), rough, thin_walled });
+            return Ok(Response::Transmissive {
+                why: format!("{transmission_name} {transmission}"),
+                rough,
+                thin_walled,
+            });
         }
         if transmission >= THRESHOLD {
             diagnostics.warn(
@@ -211,7 +215,10 @@ impl<'a> Surface<'a> {
             );
         }
         if metalness >= THRESHOLD {
-            return Ok(Response::Metal { why: format!("{metalness_name} {metalness}"), rough: self.is_rough(diagnostics)? });
+            return Ok(Response::Metal {
+                why: format!("{metalness_name} {metalness}"),
+                rough: self.is_rough(diagnostics)?,
+            });
         }
         Ok(Response::Opaque(format!("{transmission_name} {transmission}")))
     }
@@ -334,7 +341,9 @@ impl<'a> Surface<'a> {
             diagnostics.warn(
                 "textured-input",
                 self.values.place(name),
-                format!("is driven by a network, which the specular chain does not read: its default {default} is used"),
+                format!(
+                    "is driven by a network, which the specular chain does not read: its default {default} is used"
+                ),
             );
         }
         driven

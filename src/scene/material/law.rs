@@ -217,7 +217,7 @@ fn compile(form: Form, values: &Values<'_>, shader_ior: f64, diagnostics: &mut D
                 return values.refuse(VD, "author a positive Abbe number, or 0 for no dispersion");
             }
             match vd > 0.0 {
-                true => Dispersion::abbe_number(nd, vd).map_err(at(VD)),
+                true => Dispersion::from_abbe_number(nd, vd).map_err(at(VD)),
                 false => Dispersion::constant(nd).map_err(at(ND)),
             }
         }
@@ -274,7 +274,10 @@ fn formula(values: &Values<'_>, diagnostics: &mut Diagnostics) -> Result<Dispers
     if is_known && pairs.len() % 2 != 0 {
         return values.refuse(
             COEFFICIENTS,
-            format!("formula {number} takes C1 and then pairs, an odd number of values; {} are authored", coefficients.len()),
+            format!(
+                "formula {number} takes C1 and then pairs, an odd number of values; {} are authored",
+                coefficients.len()
+            ),
         );
     }
     let (first, second): (Vec<f64>, Vec<f64>) = pairs.chunks_exact(2).map(|pair| (pair[0], pair[1])).unzip();
