@@ -133,7 +133,9 @@ class ShapeReader:
             self._diagnostics.warn("unreadable-attribute", where, f"the value is not {wanted}; it is left out")
         else:
             self._diagnostics.warn(
-                "converted-attribute", where, f"the value ({authored}) was converted to {wanted}, with {element}'s digits"
+                "converted-attribute",
+                where,
+                f"the value ({authored}) was converted to {wanted}",
             )
 
     def _normals(self, prim: Any, name: str) -> dict[str, Any] | None:
@@ -143,7 +145,7 @@ class ShapeReader:
         attribute = primvar if primvar and primvar.HasAuthoredValue() else plain
         has_normals = bool(attribute) and attribute.HasAuthoredValue()
         if scheme != tokens.NO_SUBDIVISION:
-            ignored = "; its authored normals are ignored, as USD has it for subdivision surfaces" if has_normals else ""
+            ignored = "; its normals are ignored, as USD has it for subdivision surfaces" if has_normals else ""
             self._diagnostics.warn(
                 "subdivision-control-mesh",
                 place(prim),
@@ -207,7 +209,9 @@ class ShapeReader:
             element = read(child, tokens.ELEMENT_TYPE, self._time)
             if element != tokens.FACE:
                 self._diagnostics.warn(
-                    "unsupported-subset", place(child), f"a material subset of {element} elements is left out: use faces"
+                    "unsupported-subset",
+                    place(child),
+                    f"a subset of {element} elements is left out: use faces",
                 )
                 continue
             faces = self._ints(child, tokens.INDICES)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import tokens
-from ._pxr import UsdGeom
+from ._pxr import Usd, UsdGeom
 from .cameras import all_cameras, read_camera
 from .description import Diagnostics
 from .reader import default_camera
@@ -128,9 +128,7 @@ def settings(
                 seen.append(str(camera.GetPath()))
                 return len(seen) - 1
 
-            document = read_settings(
-                stage, prim, time, time_code or 0.0, None, index, False, source, diagnostics
-            )
+            document = read_settings(stage, prim, time, time_code or 0.0, None, index, False, source, diagnostics)
             found.append(_settings_info(prim, document, seen, prim == default))
         return found
 
@@ -157,7 +155,7 @@ def _settings_info(prim: Any, document: dict[str, Any], cameras_seen: list[str],
         for product in document["products"]
     )
     base = document["base"]
-    purposes = read(prim, tokens.INCLUDED_PURPOSES, 0.0)
+    purposes = read(prim, tokens.INCLUDED_PURPOSES, Usd.TimeCode.Default())
     return SettingsInfo(
         path=base["path"],
         is_default=is_default,

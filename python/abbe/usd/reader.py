@@ -1,7 +1,7 @@
 """The way through the stage: every prim once, in order, to the description.
 
-Visibility, purpose and ``upAxis`` are settled here, so that nothing below has to ask. What is not supported is named in a
-warning with its prim path; what was not asked for is counted.
+Visibility, purpose and ``upAxis`` are settled here, so that nothing below has to ask. What is not supported is named
+in a warning with its prim path; what was not asked for is counted.
 """
 
 from __future__ import annotations
@@ -20,7 +20,17 @@ from .description import Description, Diagnostics
 from .geometry import ShapeReader
 from .materials import MaterialReader
 from .render import find_settings, read_settings
-from .stage import OpenedStage, Overrides, composition_warnings, open_stage, quiet_usd, source_name, stage_metadata, stage_time
+from .stage import (
+    OpenedStage,
+    Overrides,
+    composition_warnings,
+    open_stage,
+    quiet_usd,
+    source_name,
+    stage_metadata,
+    stage_time,
+    usd_reason,
+)
 from .values import IDENTITY, is_finite, matrix, place, read
 
 __all__ = ["default_camera", "read_stage"]
@@ -161,7 +171,9 @@ class _Walk:
             )
         elif kind is _Kind.UNKNOWN:
             self.diagnostics.warn(
-                "unknown-prim-type", place(prim), f"no schema of this USD declares {prim.GetTypeName()}; the prim is ignored"
+                "unknown-prim-type",
+                place(prim),
+                f"no schema of this USD declares {prim.GetTypeName()}; it is ignored",
             )
         else:
             self.diagnostics.warn(
@@ -172,7 +184,9 @@ class _Walk:
         mode = read(prim, tokens.DRAW_MODE, self.time)
         if mode and mode not in tokens.FULL_DRAW_MODES and state.visible:
             self.diagnostics.warn(
-                "unsupported-draw-mode", place(prim), f"draw mode '{mode}' is not supported; the model is rendered in full"
+                "unsupported-draw-mode",
+                place(prim),
+                f"draw mode '{mode}' is not supported; all of it is rendered",
             )
 
     def _place(self, prim: Any, shape: int | None, state: _State) -> None:
@@ -181,7 +195,7 @@ class _Walk:
         placement: dict[str, Any] = {"path": str(prim.GetPath()), "target": {"shape": shape}}
         transform = matrix(self.transforms.GetLocalToWorldTransform(prim))
         if not is_finite(transform):
-            raise StageError(f"{place(prim)}: its transform is not finite: correct its xformOps and those of its parents")
+            raise StageError(f"{place(prim)}: its transform is not finite: correct its xformOps or its parents'")
         if transform != IDENTITY:
             placement["transform"] = transform
         if state.instance is not None:
@@ -214,7 +228,9 @@ class _Walk:
             if extent is None:
                 continue
             world = Gf.Matrix4d(*placement.get("transform", IDENTITY))
-            box.UnionWith(Gf.BBox3d(Gf.Range3d(Gf.Vec3d(*extent[0]), Gf.Vec3d(*extent[1])), world).ComputeAlignedRange())
+            box.UnionWith(
+                Gf.BBox3d(Gf.Range3d(Gf.Vec3d(*extent[0]), Gf.Vec3d(*extent[1])), world).ComputeAlignedRange()
+            )
         return _finite_box(box)
 
     def stage_bounds(self) -> tuple[list[float], list[float]] | None:
@@ -255,7 +271,7 @@ def read_stage(
             return _read(opened, diagnostics, frame, camera, render_settings, product, purposes, missing, strict)
         except Tf.ErrorException as error:
             # A call of USD that no one expects to fail: the stage is at fault, or we are; either way no traceback.
-            raise StageError(f"{opened.source}: USD cannot read it: {' '.join(str(error).split())}") from error
+            raise StageError(f"{opened.source}: USD cannot read it: {usd_reason(error)}: correct the file") from error
 
 
 def _read(
@@ -364,4 +380,3 @@ def _framed(walk: _Walk, up_axis: str, source: str, strict: bool, diagnostics: D
         message = "the stage has no camera: what is rendered is framed by a 50 mm lens"
     diagnostics.warn("framed-camera", source, message)
     return framed_camera(*box, up_axis)
-
