@@ -1,1 +1,81 @@
 //! Shapes, instances and the trees over them: what a ray meets, and how the surface is curved there.
+//!
+//! Conventions: *render space* is the stage's world minus the camera position, in f64. Points stay as authored, f32 in
+//! object space, and no transform is baked into them; rays go to object space instead. f32 boxes find what a ray may
+//! meet (`tree.rs`, `walk.rs`), f64 shapes decide it (`triangle.rs`, `sphere.rs`), so the tree never decides what is hit. Every
+//! tolerance is a rounding bound of the numbers at hand: scaling a scene by a power of two changes no bit.
+//!
+//! A triangle covers its border half-open, by exact signs (`triangle.rs`): a ray through an edge or a vertex of a closed
+//! mesh crosses exactly the triangles that a ray infinitesimally beside it crosses.
+//!
+//! Limits: object-space points between about 1e-37 and 1e37 in size keep all this; f32 has no digits below.
+
+mod aggregate;
+mod buffer;
+mod departures;
+mod mesh;
+mod placed;
+mod polygons;
+mod sphere;
+mod start;
+mod surface;
+mod topology;
+mod tree;
+mod triangle;
+mod walk;
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+pub use aggregate::Aggregate;
+pub use buffer::Buffer;
+pub use departures::Departures;
+pub use mesh::{Mesh, MeshReport};
+pub use polygons::{Interpolation, PolygonMesh, PrimvarView};
+pub use sphere::Sphere;
+
+/// A ray in render space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: DVec3,
+    /// Unit vector along travel.
+    pub direction: DVec3,
+}
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Along the ray, ≥ 0; 0 for a surface that coincides with the one the ray stands on.
+    pub distance: f64,
+    /// Index of the instance.
+    pub instance: u32,
+    /// Triangle of the mesh; 0 for a sphere.
+    pub primitive: u32,
+    /// Weights of the triangle's second and third corner; 0 for a sphere.
+    pub barycentric: [f64; 2],
+    /// The ray leaves the shape: direction · n_g > 0 with n_g outward as authored. Never 0: a ray that only touches a
+    /// surface does not meet it.
+    pub leaving: bool,
+    /// The surface passes through the start of the ray, up to rounding ([`Departures`] keeps what was crossed there).
+    pub at_start: bool,
+}
+
+/// A shape in its object space.
+#[derive(Debug)]
+pub enum Shape {
+    /// An analytic sphere about the origin; an ellipsoid under a transform that is no similarity.
+    Sphere(Sphere),
+    /// Triangles.
+    Mesh(Mesh),
+}
+
+/// A shape, placed.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// What is placed; shared by all its instances.
+    pub shape: Arc<Shape>,
+    /// Its place in the stage's world; not singular.
+    pub world_from_object: DAffine3,
+}

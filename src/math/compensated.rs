@@ -62,9 +62,9 @@ pub fn w_squared(ior_i: f64, ior_t: f64, g: f64) -> f64 {
     let (w2, w2_error) = two_sum(q, g2);
     let tail = (q_error + g2_error) + (difference * sum_error + difference_error * sum);
     let result = w2 + (w2_error + tail);
-    // The tail's own rounding is at most a few 2⁻¹⁰⁶ of g² and of q. While the result is above 2⁻⁴⁹ g² that is below an
-    // eighth of its last place; below, it is not.
-    const TRUSTED: f64 = 1.0 / (1u64 << 49) as f64;
+    // What the tail leaves out and rounds is below 2⁻¹⁰² of the larger of |q| and g². Where the result is above 2⁻⁴⁶ g² that
+    // is less than a tenth of its last place; below, both are equal to 46 bits and only their exact difference will do.
+    const TRUSTED: f64 = 1.0 / (1u64 << 46) as f64;
     if result.abs() >= TRUSTED * g2 { result } else { w_squared_expanded(ior_i, ior_t, g) }
 }
 

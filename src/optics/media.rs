@@ -81,9 +81,12 @@ impl MediaStack {
         self.spill.push(inside);
     }
 
-    /// Goes out of the last entry of `instance` and `slot`. Returns whether there was one; if not, nothing changes.
-    pub fn leave(&mut self, instance: u32, slot: u32) -> bool {
-        let Some(index) = self.find(instance, slot) else { return false };
+    /// Goes out of `inside`. Returns whether the ray was inside; if not, nothing changes.
+    ///
+    /// What is left is the last entry of the same instance and slot; where there is none, the last of the same medium: a
+    /// bubble modelled as a shell of the glass around it, with its normals towards the air, leaves that glass.
+    pub fn leave(&mut self, inside: &Inside) -> bool {
+        let Some(index) = self.find(inside) else { return false };
         if self.spill.is_empty() {
             self.inline.copy_within(index + 1..self.len, index);
             self.len -= 1;
@@ -103,14 +106,16 @@ impl MediaStack {
         strongest(self.entries(), None, Some(inside))
     }
 
-    /// The medium behind a surface that leaves `instance` and `slot`.
-    pub fn preview_leave(&self, instance: u32, slot: u32) -> Result<Option<MediumId>, NotInside> {
-        let index = self.find(instance, slot).ok_or(NotInside)?;
+    /// The medium behind a surface that [leaves](Self::leave) `inside`.
+    pub fn preview_leave(&self, inside: &Inside) -> Result<Option<MediumId>, NotInside> {
+        let index = self.find(inside).ok_or(NotInside)?;
         Ok(strongest(self.entries(), Some(index), None))
     }
 
-    fn find(&self, instance: u32, slot: u32) -> Option<usize> {
-        self.entries().iter().rposition(|entry| entry.instance == instance && entry.slot == slot)
+    fn find(&self, inside: &Inside) -> Option<usize> {
+        let entries = self.entries();
+        let same_object = |entry: &Inside| entry.instance == inside.instance && entry.slot == inside.slot;
+        entries.iter().rposition(same_object).or_else(|| entries.iter().rposition(|e| e.medium == inside.medium))
     }
 }
 
@@ -143,8 +148,8 @@ mod tests {
     fn outside_is_no_medium() {
         let mut stack = MediaStack::new();
         assert_eq!(stack.current(), None);
-        assert!(!stack.leave(0, 0), "nothing was entered");
-        assert_eq!(stack.preview_leave(0, 0), Err(NotInside));
+        assert!(!stack.leave(&inside(0, 0)), "nothing was entered");
+        assert_eq!(stack.preview_leave(&inside(0, 0)), Err(NotInside));
         assert_eq!(stack.preview_enter(&inside(3, 0)), medium(3));
         assert_eq!(stack.current(), None, "a preview changes nothing");
     }
@@ -155,10 +160,10 @@ mod tests {
         stack.enter(inside(1, 0));
         stack.enter(inside(2, 0));
         assert_eq!(stack.current(), medium(2));
-        assert_eq!(stack.preview_leave(2, 0), Ok(medium(1)));
-        assert!(stack.leave(2, 0));
+        assert_eq!(stack.preview_leave(&inside(2, 0)), Ok(medium(1)));
+        assert!(stack.leave(&inside(2, 0)));
         assert_eq!(stack.current(), medium(1));
-        assert!(stack.leave(1, 0));
+        assert!(stack.leave(&inside(1, 0)));
         assert_eq!(stack.current(), None);
     }
 
@@ -167,8 +172,8 @@ mod tests {
         let mut stack = MediaStack::new();
         stack.enter(inside(1, 0));
         stack.enter(inside(2, 0));
-        assert_eq!(stack.preview_leave(1, 0), Ok(medium(2)), "the boundary of 1 inside of 2 changes nothing");
-        assert!(stack.leave(1, 0));
+        assert_eq!(stack.preview_leave(&inside(1, 0)), Ok(medium(2)), "the boundary of 1 inside of 2 changes nothing");
+        assert!(stack.leave(&inside(1, 0)));
         assert_eq!(stack.current(), medium(2));
     }
 
@@ -181,8 +186,8 @@ mod tests {
         assert_eq!(stack.preview_enter(&inside(2, 1)), medium(2), "among equals the last entered");
         assert_eq!(stack.preview_enter(&inside(2, -5)), medium(2));
         stack.enter(inside(2, 2));
-        assert_eq!(stack.preview_leave(1, 0), Ok(medium(2)));
-        assert!(stack.leave(1, 0));
+        assert_eq!(stack.preview_leave(&inside(1, 0)), Ok(medium(2)));
+        assert!(stack.leave(&inside(1, 0)));
         assert_eq!(stack.current(), medium(2));
     }
 
@@ -191,10 +196,23 @@ mod tests {
         let mut stack = MediaStack::new();
         stack.enter(inside(1, 0));
         stack.enter(inside(1, 0));
-        assert!(stack.leave(1, 0));
+        assert!(stack.leave(&inside(1, 0)));
         assert_eq!(stack.current(), medium(1));
-        assert!(stack.leave(1, 0));
-        assert!(!stack.leave(1, 0));
+        assert!(stack.leave(&inside(1, 0)));
+        assert!(!stack.leave(&inside(1, 0)));
+    }
+
+    #[test]
+    fn a_bubble_modelled_as_a_shell_of_its_glass_leaves_the_glass() {
+        let glass = |instance| Inside { instance, slot: 1, medium: MediumId(7), priority: 0 };
+        let mut stack = MediaStack::new();
+        stack.enter(glass(1));
+        assert_eq!(stack.preview_leave(&glass(2)), Ok(None));
+        assert!(stack.leave(&glass(2)));
+        assert_eq!(stack.current(), None, "in the air of the bubble");
+        stack.enter(glass(2));
+        assert!(stack.leave(&glass(1)));
+        assert_eq!(stack.current(), None);
     }
 
     #[test]
@@ -202,8 +220,11 @@ mod tests {
         let mut stack = MediaStack::new();
         stack.enter(Inside { instance: 1, slot: 0, medium: MediumId(7), priority: 0 });
         stack.enter(Inside { instance: 1, slot: 2, medium: MediumId(8), priority: 0 });
-        assert_eq!(stack.preview_leave(1, 1), Err(NotInside));
-        assert!(stack.leave(1, 0));
+        assert_eq!(
+            stack.preview_leave(&Inside { instance: 1, slot: 1, medium: MediumId(9), priority: 0 }),
+            Err(NotInside)
+        );
+        assert!(stack.leave(&Inside { instance: 1, slot: 0, medium: MediumId(7), priority: 0 }));
         assert_eq!(stack.current(), Some(MediumId(8)));
     }
 
@@ -216,11 +237,11 @@ mod tests {
             assert_eq!(stack.entries().len(), instance as usize + 1);
         }
         for instance in 0..39 {
-            assert!(stack.leave(instance, 0), "{instance}");
+            assert!(stack.leave(&inside(instance, 0)), "{instance}");
             assert_eq!(stack.entries().len(), 39 - instance as usize);
             assert_eq!(stack.current(), medium(39));
         }
-        assert!(stack.leave(39, 0));
+        assert!(stack.leave(&inside(39, 0)));
         assert_eq!(stack.current(), None);
     }
 }

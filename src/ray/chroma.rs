@@ -16,8 +16,7 @@ pub fn screen_motion(v_x: DVec3, v_y: DVec3, v_lambda: DVec3, normal: DVec3) -> 
     const LOST: f64 = 1024.0 * f64::EPSILON;
     let delta = v_x.cross(v_y).dot(normal);
     let scale = v_x.length() * v_y.length() * normal.length();
-    // Negated, so that NaN is absent too.
-    if !(delta.abs() > LOST * scale) {
+    if delta.abs() <= LOST * scale {
         return None;
     }
     let motion = DVec2::new(-v_lambda.cross(v_y).dot(normal) / delta, -v_x.cross(v_lambda).dot(normal) / delta);

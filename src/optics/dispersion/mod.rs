@@ -140,6 +140,9 @@ impl Dispersion {
     /// Refuses a scale that drives the index out of its physical range somewhere in 360–830 nm.
     pub fn scaled(&self, scale: f64) -> Result<Self, String> {
         finite("the dispersion scale", &[scale])?;
+        if self.is_constant() {
+            return Ok(self.clone());
+        }
         let scale = self.scale * scale;
         if scale == 0.0 {
             return Ok(Self { law: Law::Constant(self.ior_d), scale: 1.0, ior_d: self.ior_d });
@@ -157,20 +160,25 @@ impl Dispersion {
         let [ior, first, second] = self.law.at(wavelength.micrometers());
         // Per µm to per nm.
         let (first, second) = (first / 1e3, second / 1e6);
-        if self.scale == 1.0 {
-            IorJet { ior, dior_dlambda: first, d2ior_dlambda2: second }
-        } else {
+        if self.is_scaled() {
             IorJet {
                 ior: self.ior_d + self.scale * (ior - self.ior_d),
                 dior_dlambda: self.scale * first,
                 d2ior_dlambda2: self.scale * second,
             }
+        } else {
+            IorJet { ior, dior_dlambda: first, d2ior_dlambda2: second }
         }
     }
 
     /// Whether the index does not depend on wavelength; then derivatives are exactly 0.
     pub fn is_constant(&self) -> bool {
         matches!(self.law, Law::Constant(_))
+    }
+
+    #[expect(clippy::float_cmp, reason = "1 is a setting here, not a result: then not even a rounding is added")]
+    fn is_scaled(&self) -> bool {
+        self.scale != 1.0
     }
 
     /// V_d = (n_d − 1)/(n_F − n_C); `None` if n_F = n_C, as for a constant index.
@@ -183,7 +191,7 @@ impl Dispersion {
     /// The law with its coefficients, n_d and V_d, in one line.
     pub fn describe(&self) -> String {
         let mut text = self.law.describe();
-        if self.scale != 1.0 {
+        if self.is_scaled() {
             text += &format!(", dispersion scaled by {}", self.scale);
         }
         if let Some(vd) = self.abbe_number() {

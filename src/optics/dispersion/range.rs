@@ -72,12 +72,10 @@ impl IorRange {
 fn stays_positive(terms: usize, term: impl Fn(usize, f64) -> f64) -> Result<(), f64> {
     let (first, last) = (SHORTEST.micrometers(), LONGEST.micrometers());
     let value = |x: f64| (0..terms).map(|k| term(k, x)).sum::<f64>();
-    for end in [first, last] {
-        // Negated, so that NaN is refused too.
-        if !(value(end) > 0.0) {
-            return Err(end);
-        }
-    }
+    // Asked for the good case, so that NaN is refused too.
+    let positive_at = |x: f64| if value(x) > 0.0 { Ok(()) } else { Err(x) };
+    positive_at(first)?;
+    positive_at(last)?;
     let mut open = vec![(first, last)];
     for _ in 0..MOST_INTERVALS {
         let Some((a, b)) = open.pop() else { return Ok(()) };
@@ -92,9 +90,7 @@ fn stays_positive(terms: usize, term: impl Fn(usize, f64) -> f64) -> Result<(), 
             continue;
         }
         let middle = 0.5 * (a + b);
-        if !(value(middle) > 0.0) {
-            return Err(middle);
-        }
+        positive_at(middle)?;
         open.push((middle, b));
         open.push((a, middle));
     }
