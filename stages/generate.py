@@ -199,7 +199,7 @@ def mesh(
         lines += [f"normal3f[] normals = {tuples(normals, 6)} (", '    interpolation = "vertex"', ")"]
     lines.append(f"point3f[] points = {tuples(points, decimals)}")
     if uv:
-        lines += [f"texCoord2f[] primvars:st = {tuples(uv, 6)} (", '    interpolation = "vertex"', ")"]
+        lines += [f"texCoord2f[] primvars:st = {tuples(uv, 5)} (", '    interpolation = "vertex"', ")"]
     if subsets:
         lines.append('uniform token subsetFamily:materialBind:familyType = "nonOverlapping"')
     lines.append('uniform token subdivisionScheme = "none"')
@@ -239,7 +239,7 @@ def board(
         if is_second(i, j):
             second.append(len(faces))
         faces.append((corner, corner + 1, corner + 1 + len(columns), corner + len(columns)))
-    subsets = {looks[1]: (looks[1], second)}
+    subsets = {looks[1]: (looks[1], second)} if second else None
     return mesh(name, points, faces, looks[0], decimals=5, uv=uv, subsets=subsets, is_double_sided=True)
 
 
@@ -248,12 +248,36 @@ def steps(low: float, high: float, count: int) -> list[float]:
     return [low + (high - low) * i / count for i in range(count + 1)]
 
 
-def lines_between(low: float, high: float, pitch: float, thickness: float) -> list[float]:
-    """Edges of lines of a thickness about every multiple of the pitch: space, line, space, line … from low to high."""
-    edges = [low]
-    for k in range(math.ceil(low / pitch), math.floor(high / pitch) + 1):
-        edges += [x for x in (k * pitch - thickness / 2, k * pitch + thickness / 2) if low < x < high]
-    return [*edges, high]
+def grid(
+    paper: str,
+    lines: str,
+    z: float,
+    ranges: tuple[tuple[float, float], tuple[float, float]],
+    pitch: float,
+    thickness: float,
+    looks: tuple[str, str],
+) -> list[list[str]]:
+    """Paper facing +z with thin rectangles before it, one about every multiple of the pitch.
+
+    The rectangles lie a hundredth of their thickness apart, so that no two surfaces coincide.
+    """
+    (left, right), (bottom, top) = ranges
+    sheet = board(paper, (0.0, 0.0, z), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), [left, right], [bottom, top], looks, never)
+    points: list[Vector] = []
+    for axis, (low, high) in enumerate(ranges):
+        layer = z + (axis + 1) * thickness / 100
+        for k in range(math.ceil(low / pitch), math.floor(high / pitch) + 1):
+            a, b = k * pitch - thickness / 2, k * pitch + thickness / 2
+            box = ((a, bottom), (b, bottom), (b, top), (a, top)) if axis == 0 else ((left, a), (right, a), (right, b), (left, b))
+            points += [(x, y, layer) for x, y in box]
+    uv = [((x - left) / (right - left), (y - bottom) / (top - bottom)) for x, y, _ in points]
+    faces = [(k, k + 1, k + 2, k + 3) for k in range(0, len(points), 4)]
+    return [sheet, mesh(lines, points, faces, looks[1], decimals=4, uv=uv, is_double_sided=True)]
+
+
+def never(i: int, j: int) -> bool:
+    """No rectangle."""
+    return False
 
 
 def chequered(i: int, j: int) -> bool:
@@ -521,12 +545,12 @@ def ball() -> str:
 # --- lens -------------------------------------------------------------------------------------------------------------
 
 # The cemented doublet, from the side of the distant conjugate; mm. The prescription published for Thorlabs AC254-100-A.
-LENS_RADII = (62.8, -45.7, -128.2)
+LENS_RADII = (62.75, -45.71, -128.23)
 LENS_THICKNESSES = (4.0, 2.5)
 LENS_GLASSES = ("N-BK7", "SF5")
 LENS_RIM, LENS_BEVEL = 12.7, 0.3
-# Rings of the disc; ring k has 6k points, so triangles are even and the rim has 96 sides.
-LENS_RINGS = 16
+# Rings of the disc; ring k has 6k points, so triangles are even and the rim has 84 sides.
+LENS_RINGS = 14
 LENS_OBJECT = 60.0
 
 
@@ -643,16 +667,7 @@ def lens() -> str:
         mesh("Crown", turned(crown[0]), crown[2], "NBK7", decimals=4, normals=turned(crown[1])),
         mesh("Flint", turned(flint[0]), flint[2], "SF5", decimals=4, normals=turned(flint[1])),
         mesh("Mount", turned(ring[0]), ring[1], "Black", decimals=4),
-        board(
-            "Target",
-            (0.0, 0.0, target),
-            (1.0, 0.0, 0.0),
-            (0.0, 1.0, 0.0),
-            lines_between(-61.0, 61.0, 4.0, 0.5),
-            lines_between(-27.0, 61.0, 4.0, 0.5),
-            ("White", "Ink"),
-            lambda i, j: i % 2 == 1 or j % 2 == 1,
-        ),
+        *grid("Paper", "Grid", target, ((-61.0, 61.0), (-27.0, 61.0)), 4.0, 0.5, ("White", "Ink")),
         board(
             "Floor",
             (0.0, -27.0, 0.0),
