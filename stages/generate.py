@@ -877,9 +877,9 @@ def gem() -> str:
     ]
     doc = f"""A diamond in round brilliant cut, 6.5 mm, 57 facets and a girdle of {GEM_GIRDLE_SIDES}: crown
     {GEM_CROWN_ANGLE:g} degrees, pavilion {GEM_PAVILION_ANGLE:g} degrees, table {100 * GEM_TABLE:g} %;
-    it floats over a dark floor in a tent of panels. Look for: fire. After two or more total reflections `dispersion` and `dispersion_footprint` differ
-    from facet to facet by orders of magnitude; `total_reflections` draws the facets of the pavilion, and
-    `footprint_half_width` tells where the first order ends."""
+    it floats over a dark floor in a tent of panels. Look for: fire. After two or more total reflections `dispersion`
+    and `dispersion_footprint` differ from facet to facet by orders of magnitude; `total_reflections` draws the facets
+    of the pavilion, and `footprint_half_width` tells where the first order ends."""
     return stage("gem", doc, "0.001", looks, prims)
 
 
