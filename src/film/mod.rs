@@ -5,6 +5,7 @@
 
 pub mod aov;
 pub mod metadata;
+pub mod pixel;
 pub mod sum;
 
 use aov::{Aov, SampleType};

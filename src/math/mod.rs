@@ -1,1 +1,3 @@
 //! Arithmetic that keeps its digits.
+
+pub mod compensated;

@@ -1,52 +1,190 @@
-//! The surface around a hit, to second order.
+//! A surface near one of its points, as far as two derivatives of a ray need it.
 
 use glam::{DMat3, DVec3};
 
-/// How the geometric surface bends: what κ = n_g·q'' it forces on a point q that moves on it.
+/// How a surface bends away from its tangent plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Curvature {
-    /// κ = 0.
+    /// Not at all: a triangle, a plane.
     Plane,
-    /// κ = −|q'|²·inv_radius, n_g outward.
+    /// A sphere with n_g pointing away from its centre (`inv_radius` > 0) or towards it (< 0).
     Sphere {
-        /// 1 / radius.
+        /// 1/r, in 1/stage unit.
         inv_radius: f64,
     },
-    /// κ = −q'ᵀ·hessian·q'.
+    /// A level set f = 0 of a quadratic f with ∇f along n_g.
     Quadric {
-        /// H/|∇f| with ∇f along n_g.
+        /// The Hessian of f divided by |∇f|, in 1/stage unit; symmetric.
         hessian: DMat3,
     },
 }
 
-/// How the shading normal varies over the surface.
+impl Curvature {
+    /// κ = n_g·q'', what the surface demands of the second derivative of a point that moves on it with q'
+    /// (MATH.md 2.4).
+    #[inline]
+    pub fn normal_acceleration(&self, dpoint: DVec3) -> f64 {
+        match self {
+            Self::Plane => 0.0,
+            Self::Sphere { inv_radius } => -dpoint.length_squared() * inv_radius,
+            Self::Quadric { hessian } => -dpoint.dot(*hessian * dpoint),
+        }
+    }
+
+    /// The field of the geometric normal `n_g` itself.
+    ///
+    /// Its second derivative is that of the surface as long as ∇f is linear, which it is for planes, spheres and quadrics.
+    pub fn normal_field(&self, n_g: DVec3) -> NormalField {
+        match *self {
+            Self::Plane => NormalField::Flat,
+            Self::Sphere { inv_radius } => NormalField::Sphere { inv_radius },
+            // n_g = ∇f/|∇f| and d(∇f) = H dq; dividing both by |∇f| at this point leaves S = n_g.
+            Self::Quadric { hessian } => NormalField::Linear { vector: n_g, gradient: hessian },
+        }
+    }
+}
+
+/// How the shading normal changes over the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NormalField {
-    /// N' = 0.
+    /// Not at all.
     Flat,
-    /// N' = q'·inv_radius.
+    /// N' = q'/r, N'' = q''/r: the normal of a sphere.
     Sphere {
-        /// 1 / radius.
+        /// 1/r, in 1/stage unit; negative if the normal points towards the centre.
         inv_radius: f64,
     },
-    /// N = S/|S| with S' = gradient·q'.
+    /// N = S/|S| with S linear in position: interpolated vertex normals, quadrics.
     Linear {
-        /// S.
+        /// S at the point.
         vector: DVec3,
-        /// ∂S/∂q.
+        /// ∂S/∂q: S' = `gradient`·q', S'' = `gradient`·q''.
         gradient: DMat3,
     },
 }
 
-/// The surface around a hit.
+impl NormalField {
+    /// The field of −N.
+    #[inline]
+    pub fn reversed(&self) -> Self {
+        match *self {
+            Self::Flat => Self::Flat,
+            Self::Sphere { inv_radius } => Self::Sphere { inv_radius: -inv_radius },
+            Self::Linear { vector, gradient } => Self::Linear { vector: -vector, gradient: -gradient },
+        }
+    }
+}
+
+/// A surface at the point where a ray meets it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalSurface {
-    /// Geometric unit normal, outward as authored.
+    /// Geometric unit normal, outward as authored. It alone decides which side a ray is on.
     pub n_g: DVec3,
     /// Shading unit normal, n_s·n_g > 0.
     pub n_s: DVec3,
     /// Of the geometric surface.
     pub curvature: Curvature,
-    /// Of the shading normal.
+    /// Of `n_s`.
     pub field: NormalField,
+}
+
+/// The derivatives of a unit normal at a point that moves. Types rather than an enum, so that the kind is decided once
+/// per event and not once per column.
+pub(super) trait Normals {
+    /// All derivatives are zero.
+    const FLAT: bool;
+    /// N' where the point moves with q' = `dpoint`.
+    fn first(&self, dpoint: DVec3) -> DVec3;
+    /// N'' where it moves with q' and q''; `dnormal` is N'.
+    fn second(&self, dpoint: DVec3, dnormal: DVec3, d2point: DVec3) -> DVec3;
+}
+
+pub(super) struct FlatNormals;
+
+impl Normals for FlatNormals {
+    const FLAT: bool = true;
+
+    #[inline(always)]
+    fn first(&self, _: DVec3) -> DVec3 {
+        DVec3::ZERO
+    }
+
+    #[inline(always)]
+    fn second(&self, _: DVec3, _: DVec3, _: DVec3) -> DVec3 {
+        DVec3::ZERO
+    }
+}
+
+pub(super) struct SphereNormals {
+    pub(super) inv_radius: f64,
+}
+
+impl Normals for SphereNormals {
+    const FLAT: bool = false;
+
+    #[inline(always)]
+    fn first(&self, dpoint: DVec3) -> DVec3 {
+        dpoint * self.inv_radius
+    }
+
+    #[inline(always)]
+    fn second(&self, _: DVec3, _: DVec3, d2point: DVec3) -> DVec3 {
+        d2point * self.inv_radius
+    }
+}
+
+pub(super) struct LinearNormals {
+    normal: DVec3,
+    length: f64,
+    inv_length: f64,
+    gradient: DMat3,
+}
+
+impl LinearNormals {
+    #[inline(always)]
+    pub(super) fn new(normal: DVec3, vector: DVec3, gradient: DMat3) -> Self {
+        let length = vector.length();
+        Self { normal, length, inv_length: 1.0 / length, gradient }
+    }
+}
+
+impl Normals for LinearNormals {
+    const FLAT: bool = false;
+
+    /// N' = (S' − (N·S') N)/|S|.
+    #[inline(always)]
+    fn first(&self, dpoint: DVec3) -> DVec3 {
+        let s1 = self.gradient * dpoint;
+        (s1 - self.normal * self.normal.dot(s1)) * self.inv_length
+    }
+
+    /// N'' = (S'' − 2L'N' − L''N)/L with L = |S|, L' = N·S' and L'' = L|N'|² + N·S'', which is MATH.md's
+    /// (|S'|² + S·S'' − L'²)/L without its cancellation.
+    #[inline(always)]
+    fn second(&self, dpoint: DVec3, dnormal: DVec3, d2point: DVec3) -> DVec3 {
+        let l1 = self.normal.dot(self.gradient * dpoint);
+        let s2 = self.gradient * d2point;
+        let l2 = self.length * dnormal.length_squared() + self.normal.dot(s2);
+        (s2 - dnormal * (2.0 * l1) - self.normal * l2) * self.inv_length
+    }
+}
+
+/// A normal whose derivative is given, not derived from the motion of a point.
+pub(super) struct GivenNormals {
+    pub(super) dnormal: DVec3,
+}
+
+impl Normals for GivenNormals {
+    const FLAT: bool = false;
+
+    #[inline(always)]
+    fn first(&self, _: DVec3) -> DVec3 {
+        self.dnormal
+    }
+
+    /// Not needed by anyone who gives first derivatives only.
+    #[inline(always)]
+    fn second(&self, _: DVec3, _: DVec3, _: DVec3) -> DVec3 {
+        DVec3::ZERO
+    }
 }

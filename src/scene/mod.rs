@@ -1,3 +1,92 @@
 //! The scene: its description, the checks, the compiled form.
+//!
+//! A [`Scene`] comes only from [`builder::build`], so what exists is valid: indices are in range, transforms invert,
+//! materials have a curve. It knows the stage's world, not yet a camera.
 
+pub mod builder;
 pub mod description;
+pub mod file;
+pub mod material;
+pub mod view;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::DAffine3;
+
+use crate::diagnostics::Diagnostics;
+use crate::error::Result;
+use crate::geometry::Shape;
+use description::{Description, Document};
+use material::Material;
+
+/// A placed shape.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// The shape, shared between its placements.
+    pub shape: Arc<Shape>,
+    /// Stage world from object space.
+    pub world_from_object: DAffine3,
+    /// `prim_id`: 1-based index into [`Scene::prims`].
+    pub prim_id: u32,
+    /// `instance_id`: 1-based index into [`Scene::instances`], 0 for none.
+    pub instance_id: u32,
+    /// Material per slot (slot 0: faces in no subset): `material_id`, 1-based index into [`Scene::materials`], 0 for none.
+    pub material_ids: Arc<[u32]>,
+}
+
+/// Everything that can be rendered, checked.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Placed shapes in the order of the description: the index is the tie-breaker between coincident surfaces.
+    pub objects: Vec<Object>,
+    /// Materials bound to some object, in the order of the description.
+    pub materials: Vec<Material>,
+    /// Prim paths behind `prim_id`.
+    pub prims: Vec<String>,
+    /// Instance paths behind `instance_id`.
+    pub instances: Vec<String>,
+    /// What was left out, and how often.
+    pub skipped: BTreeMap<String, u64>,
+    /// Counts for the statistics: triangles stored, shapes, bytes.
+    pub counts: Counts,
+    pub(crate) diagnostics: Diagnostics,
+    pub(crate) description: Description,
+}
+
+/// Sizes of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Counts {
+    /// Distinct shapes that are placed at least once.
+    pub shapes: u64,
+    /// Triangles stored, shared ones once.
+    pub triangles: u64,
+    /// Placed shapes.
+    pub objects: u64,
+    /// Materials bound to an object.
+    pub materials: u64,
+}
+
+impl Scene {
+    /// Checks and compiles a description.
+    ///
+    /// Errors name the prim concerned; oddities that were repaired stand in [`diagnostics`](Self::diagnostics).
+    pub fn build(description: Description) -> Result<Self> {
+        builder::build(description)
+    }
+
+    /// What the bridge and the builder had to say.
+    pub fn diagnostics(&self) -> &Diagnostics {
+        &self.diagnostics
+    }
+
+    /// The description the scene was built from.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// The description's document.
+    pub fn document(&self) -> &Document {
+        &self.description.document
+    }
+}

@@ -1,0 +1,128 @@
+"""The bridge: the one part of abbe that knows USD. It forwards what was authored; what it means is decided in Rust.
+
+``pxr`` is imported when the first stage is read, so that the rest of the package works without USD.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from .description import Description
+
+if TYPE_CHECKING:
+    from .listing import CameraInfo, SettingsInfo
+
+__all__ = ["Description", "describe", "list_cameras", "list_settings"]
+
+
+def describe(
+    stage_or_path: Any,
+    *,
+    frame: float | Literal["default"] | None = None,
+    camera: str | None = None,
+    render_settings: str | None = None,
+    product: str | None = None,
+    purposes: Sequence[str] | None = None,
+    variants: Sequence[str] = (),
+    overrides: Mapping[str, Any] | Sequence[str] = (),
+    search_paths: Sequence[str | os.PathLike[str]] = (),
+    missing: str = "warn",
+    strict: bool = False,
+) -> Description:
+    """Read a USD stage into a scene description.
+
+    Parameters
+    ----------
+    stage_or_path : path of a .usd, .usda, .usdc or .usdz file, or a ``pxr.Usd.Stage``, which is not changed
+    frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
+    camera : path of a Camera, or the name of the first; it then replaces the cameras that products name
+    render_settings : path of a RenderSettings prim; the stage's own, or its only one, if None
+    product : path or name of the one RenderProduct to keep
+    purposes : of default, render, proxy, guide (default always counts); the settings', else default and render, if None
+    variants : selections such as ``"/World/Ball{material=glass}"``
+    overrides : values such as ``"/World/Glass.inputs:ior=1.6"``, as text or as a mapping to Python values
+    search_paths : folders in which relative asset paths are looked up after the stage's own
+    missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+    strict : a stage without a camera is an error
+
+    Returns
+    -------
+    Description
+        The document and its arrays; arrays are float32 or int32, read-only where they are USD's own memory.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    StageError
+        The stage cannot be read or lacks what was asked for; the message begins with the prim path or file.
+    UsageError
+        An argument cannot be understood.
+    UsdMissingError
+        ``pxr`` cannot be imported.
+    """
+    from .reader import read_stage
+
+    return read_stage(
+        stage_or_path,
+        frame=frame,
+        camera=camera,
+        render_settings=render_settings,
+        product=product,
+        purposes=purposes,
+        variants=variants,
+        overrides=overrides,
+        search_paths=search_paths,
+        missing=missing,
+        strict=strict,
+    )
+
+
+def list_cameras(
+    stage_or_path: Any,
+    *,
+    frame: float | Literal["default"] | None = None,
+    variants: Sequence[str] = (),
+    overrides: Mapping[str, Any] | Sequence[str] = (),
+    search_paths: Sequence[str | os.PathLike[str]] = (),
+) -> list[CameraInfo]:
+    """List the cameras of a stage in the order of traversal.
+
+    Parameters
+    ----------
+    stage_or_path, frame, variants, overrides, search_paths : as for :func:`describe`
+
+    Returns
+    -------
+    list of CameraInfo
+        One of them has ``is_default`` set: that which :func:`describe` takes if none is asked for.
+    """
+    from .listing import cameras
+
+    return cameras(stage_or_path, frame=frame, variants=variants, overrides=overrides, search_paths=search_paths)
+
+
+def list_settings(
+    stage_or_path: Any,
+    *,
+    frame: float | Literal["default"] | None = None,
+    variants: Sequence[str] = (),
+    overrides: Mapping[str, Any] | Sequence[str] = (),
+    search_paths: Sequence[str | os.PathLike[str]] = (),
+) -> list[SettingsInfo]:
+    """List the render settings of a stage with their products and variables.
+
+    Parameters
+    ----------
+    stage_or_path, frame, variants, overrides, search_paths : as for :func:`describe`
+
+    Returns
+    -------
+    list of SettingsInfo
+        One of them has ``is_default`` set if :func:`describe` would take it unasked. Empty if there are none.
+    """
+    from .listing import settings
+
+    return settings(stage_or_path, frame=frame, variants=variants, overrides=overrides, search_paths=search_paths)

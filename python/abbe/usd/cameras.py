@@ -1,0 +1,133 @@
+"""Cameras: found by name or path, read as authored, or framed where a stage has none."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ..errors import StageError
+from . import tokens
+from ._pxr import Gf, Sdf, Usd, UsdGeom
+from .values import is_finite, matrix, place
+
+__all__ = ["all_cameras", "find_camera", "framed_camera", "read_camera"]
+
+# How many cameras an error names before it stops.
+_LISTED = 8
+
+# The camera that usdrecord frames with: GfCamera's defaults, in tenths of a stage unit.
+_HORIZONTAL_APERTURE = 20.955
+_VERTICAL_APERTURE = 15.2908
+_FOCAL_LENGTH = 50.0
+
+
+def all_cameras(stage: Any) -> list[Any]:
+    """Return every Camera prim in the order of traversal, those inside native instances included."""
+    prims = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    return [prim for prim in prims if prim.IsA(UsdGeom.Camera)]
+
+
+def find_camera(stage: Any, wanted: str, source: str) -> Any:
+    """Return the Camera prim that ``wanted`` names: a path, or the name of the first such prim.
+
+    Raises
+    ------
+    StageError
+        There is none; the message lists what there is.
+    """
+    if Sdf.Path.IsValidPathString(wanted):
+        path = Sdf.Path(wanted)
+        if path.IsAbsolutePath() or path.pathElementCount > 1:
+            prim = stage.GetPrimAtPath(path.MakeAbsolutePath(Sdf.Path.absoluteRootPath))
+            if prim and prim.IsA(UsdGeom.Camera):
+                return prim
+            if prim:
+                what = prim.GetTypeName() or "prim without a type"
+                raise StageError(f"{place(prim)}: is a {what}, not a Camera: {_remedy(stage)}")
+        else:
+            for prim in all_cameras(stage):
+                if prim.GetName() == wanted:
+                    return prim
+    raise StageError(f"{source}: has no camera '{wanted}': {_remedy(stage)}")
+
+
+def _remedy(stage: Any) -> str:
+    paths = [str(prim.GetPath()) for prim in all_cameras(stage)]
+    if not paths:
+        return "the stage has no camera at all; leave the camera out to have the scene framed"
+    more = f" and {len(paths) - _LISTED} more" if len(paths) > _LISTED else ""
+    return f"choose one of {', '.join(paths[:_LISTED])}{more}"
+
+
+def read_camera(prim: Any, time: Any, transforms: Any) -> dict[str, Any]:
+    """Return a Camera prim as the description has it."""
+    camera = UsdGeom.Camera(prim)
+
+    def number(attribute: Any, fallback: float) -> float:
+        value = attribute.Get(time)
+        value = float(value) if isinstance(value, (int, float)) else fallback
+        if not math.isfinite(value):
+            raise StageError(f"{place(prim)}.{attribute.GetName()} = {value}: is not finite: give it a number")
+        return value
+
+    transform = matrix(transforms.GetLocalToWorldTransform(prim))
+    if not is_finite(transform):
+        raise StageError(f"{place(prim)}: its transform is not finite: correct its xformOps and those of its parents")
+    result: dict[str, Any] = {
+        "path": str(prim.GetPath()),
+        "transform": transform,
+        "projection": str(camera.GetProjectionAttr().Get(time) or tokens.PERSPECTIVE),
+        "horizontal_aperture": number(camera.GetHorizontalApertureAttr(), _HORIZONTAL_APERTURE),
+        "vertical_aperture": number(camera.GetVerticalApertureAttr(), _VERTICAL_APERTURE),
+        "horizontal_aperture_offset": number(camera.GetHorizontalApertureOffsetAttr(), 0.0),
+        "vertical_aperture_offset": number(camera.GetVerticalApertureOffsetAttr(), 0.0),
+        "focal_length": number(camera.GetFocalLengthAttr(), _FOCAL_LENGTH),
+        "f_stop": number(camera.GetFStopAttr(), 0.0),
+        "focus_distance": number(camera.GetFocusDistanceAttr(), 0.0),
+        "shutter_open": number(camera.GetShutterOpenAttr(), 0.0),
+        "shutter_close": number(camera.GetShutterCloseAttr(), 0.0),
+    }
+    clipping = camera.GetClippingRangeAttr().Get(time)
+    if clipping is not None:
+        near, far = (float(value) for value in clipping)
+        # A far plane at infinity is none.
+        if math.isfinite(near) and not math.isnan(far):
+            result["clipping_range"] = [near, min(far, _FARTHEST)]
+    return result
+
+
+# The largest float32, which is what UsdGeomCamera's clippingRange can hold.
+_FARTHEST = 3.4028234663852886e38
+
+
+def framed_camera(low: Any, high: Any, up_axis: str) -> dict[str, Any]:
+    """Return a camera that sees the box from ``low`` to ``high`` as usdrecord's default one does.
+
+    It looks along −z (along +y on a stage that is Z-up) from where the front face of the box fills the width of a 50 mm
+    lens (usdAppUtils/frameRecorder.cpp). Near and far planes enclose the box with room.
+    """
+    low, high = Gf.Vec3d(*low), Gf.Vec3d(*high)
+    centre, size = (low + high) / 2.0, high - low
+    z_up = up_axis == "Z"
+    across, height, deep = (size[0], size[2], size[1]) if z_up else (size[0], size[1], size[2])
+    radius = math.hypot(across, height) / 2.0
+    if radius == 0.0:
+        # A point or a line of sight: any distance frames it.
+        radius = max(deep, 1.0) / 2.0
+    distance = radius / (_HORIZONTAL_APERTURE / 2.0 / _FOCAL_LENGTH) + deep / 2.0
+    transform = Gf.Matrix4d(1.0)
+    if z_up:
+        transform.SetRotate(Gf.Rotation(Gf.Vec3d(1, 0, 0), 90))
+        transform.SetTranslateOnly(centre - Gf.Vec3d(0, distance, 0))
+    else:
+        transform.SetTranslate(centre + Gf.Vec3d(0, 0, distance))
+    return {
+        "path": "",
+        "transform": matrix(transform),
+        "projection": tokens.PERSPECTIVE,
+        "horizontal_aperture": _HORIZONTAL_APERTURE,
+        "vertical_aperture": _VERTICAL_APERTURE,
+        "focal_length": _FOCAL_LENGTH,
+        "clipping_range": [(distance - deep / 2.0) / 100.0, (distance + deep) * 10.0],
+        "focus_distance": distance,
+    }

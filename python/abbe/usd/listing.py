@@ -1,0 +1,166 @@
+"""What a stage offers to choose from: cameras and render settings, as plain records."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from . import tokens
+from ._pxr import Usd, UsdGeom
+from .cameras import all_cameras, read_camera
+from .description import Diagnostics
+from .reader import default_camera
+from .render import all_settings, find_settings, read_settings
+from .stage import OpenedStage, Overrides, open_stage, quiet_usd, source_name, stage_time
+from .values import read
+
+__all__ = ["CameraInfo", "ProductInfo", "SettingsInfo", "VarInfo", "cameras", "settings"]
+
+
+@dataclass(frozen=True)
+class CameraInfo:
+    """A camera of a stage; lengths in tenths of a stage unit, as UsdGeomCamera has them."""
+
+    path: str
+    projection: str
+    focal_length: float
+    horizontal_aperture: float
+    vertical_aperture: float
+    f_stop: float
+    is_default: bool
+
+
+@dataclass(frozen=True)
+class VarInfo:
+    """A RenderVar."""
+
+    path: str
+    name: str
+    source_name: str
+    source_type: str
+    data_type: str
+
+
+@dataclass(frozen=True)
+class ProductInfo:
+    """A RenderProduct, flattened."""
+
+    path: str
+    name: str
+    """File name, frame tokens replaced."""
+    product_type: str
+    resolution: tuple[int, int] | None
+    """None where neither the product nor its settings author one."""
+    camera: str | None
+    vars: tuple[VarInfo, ...]
+
+
+@dataclass(frozen=True)
+class SettingsInfo:
+    """A RenderSettings prim."""
+
+    path: str
+    is_default: bool
+    resolution: tuple[int, int] | None
+    camera: str | None
+    purposes: tuple[str, ...]
+    products: tuple[ProductInfo, ...]
+
+
+def _open(
+    stage_or_path: Any,
+    variants: Sequence[str],
+    overrides: Overrides,
+    search_paths: Sequence[str | os.PathLike[str]],
+    diagnostics: Diagnostics,
+) -> OpenedStage:
+    return open_stage(
+        stage_or_path, variants=variants, overrides=overrides, search_paths=search_paths, diagnostics=diagnostics
+    )
+
+
+def cameras(
+    stage_or_path: Any,
+    *,
+    frame: float | str | None,
+    variants: Sequence[str],
+    overrides: Overrides,
+    search_paths: Sequence[str | os.PathLike[str]],
+) -> list[CameraInfo]:
+    """Return the cameras of a stage; see :func:`abbe.usd.list_cameras`."""
+    diagnostics = Diagnostics()
+    with quiet_usd(source_name(stage_or_path), diagnostics):
+        opened = _open(stage_or_path, variants, overrides, search_paths, diagnostics)
+        time, _ = stage_time(opened.stage, frame)
+        prims = all_cameras(opened.stage)
+        default = default_camera(opened.stage, find_settings(opened.stage, None, opened.source), prims)
+        transforms = UsdGeom.XformCache(time)
+        return [_camera_info(read_camera(prim, time, transforms), prim == default) for prim in prims]
+
+
+def _camera_info(camera: dict[str, Any], is_default: bool) -> CameraInfo:
+    names = ("path", "projection", "focal_length", "horizontal_aperture", "vertical_aperture", "f_stop")
+    return CameraInfo(**{name: camera[name] for name in names}, is_default=is_default)
+
+
+def settings(
+    stage_or_path: Any,
+    *,
+    frame: float | str | None,
+    variants: Sequence[str],
+    overrides: Overrides,
+    search_paths: Sequence[str | os.PathLike[str]],
+) -> list[SettingsInfo]:
+    """Return the render settings of a stage; see :func:`abbe.usd.list_settings`."""
+    diagnostics = Diagnostics()
+    with quiet_usd(source_name(stage_or_path), diagnostics):
+        opened = _open(stage_or_path, variants, overrides, search_paths, diagnostics)
+        stage, source = opened.stage, opened.source
+        time, time_code = stage_time(stage, frame)
+        default = find_settings(stage, None, source)
+        found = []
+        for prim in all_settings(stage):
+            seen: list[str] = []
+
+            def index(camera: Any, seen: list[str] = seen) -> int:
+                seen.append(str(camera.GetPath()))
+                return len(seen) - 1
+
+            document = read_settings(stage, prim, time, time_code or 0.0, None, index, False, source, diagnostics)
+            found.append(_settings_info(prim, document, seen, prim == default))
+        return found
+
+
+def _settings_info(prim: Any, document: dict[str, Any], cameras_seen: list[str], is_default: bool) -> SettingsInfo:
+    def camera_of(product: dict[str, Any]) -> str | None:
+        return cameras_seen[product["camera"]] if "camera" in product else None
+
+    def resolution_of(product: dict[str, Any]) -> tuple[int, int] | None:
+        return tuple(product["resolution"]) if "resolution" in product else None
+
+    products = tuple(
+        ProductInfo(
+            path=product["path"],
+            name=product["name"],
+            product_type=product["product_type"],
+            resolution=resolution_of(product),
+            camera=camera_of(product),
+            vars=tuple(
+                VarInfo(**{name: var[name] for name in ("path", "name", "source_name", "source_type", "data_type")})
+                for var in product["vars"]
+            ),
+        )
+        for product in document["products"]
+    )
+    base = document["base"]
+    purposes = read(prim, tokens.INCLUDED_PURPOSES, Usd.TimeCode.Default())
+    return SettingsInfo(
+        path=base["path"],
+        is_default=is_default,
+        resolution=resolution_of(base),
+        camera=camera_of(base),
+        purposes=tuple(str(p) for p in (tokens.DEFAULT_PURPOSES if purposes is None else purposes)),
+        products=products,
+    )

@@ -1,0 +1,453 @@
+"""Opening stages: files and stages in memory, variants and values set for one render, and what does not compose.
+
+Overrides go to a session layer of our own; neither the files nor the caller's stage are changed.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..errors import StageError, UsageError
+from . import tokens
+from ._pxr import Ar, Pcp, Sdf, Usd, UsdUtils
+from .description import Diagnostics
+from .values import place
+
+__all__ = [
+    "OpenedStage",
+    "Overrides",
+    "composition_warnings",
+    "open_stage",
+    "quiet_usd",
+    "source_name",
+    "stage_metadata",
+    "stage_time",
+    "usd_reason",
+]
+
+Overrides = Mapping[str, Any] | Sequence[str]
+"""``{"/World/Glass.inputs:ior": 1.6}`` or ``["/World/Glass.inputs:ior=1.6"]``."""
+
+
+@dataclass
+class OpenedStage:
+    """A stage and what must live as long as it."""
+
+    stage: Any
+    source: str
+    """The root layer as the user named it."""
+    keep: list[Any] = field(default_factory=list)
+
+
+def source_name(stage_or_path: Any) -> str:
+    """Return what messages call a stage: its path as given, or its root layer."""
+    if not isinstance(stage_or_path, Usd.Stage):
+        return str(stage_or_path)
+    root = stage_or_path.GetRootLayer()
+    # An anonymous layer's identifier is an address, which no two runs share.
+    return str(root.GetDisplayName() or "stage in memory") if root.anonymous else str(root.realPath or root.identifier)
+
+
+@contextmanager
+def quiet_usd(source: str, diagnostics: Diagnostics) -> Iterator[None]:
+    """Keep USD's own warnings off the terminal, and record those that are not reported otherwise.
+
+    Composition errors are reported by :func:`composition_warnings`, with prim paths; a crate file's age is not the
+    user's concern.
+    """
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield
+    finally:
+        try:
+            for item in delegate.TakeUncoalescedDiagnostics():
+                if not any(name in item.sourceFunction for name in _REPORTED_ELSEWHERE):
+                    diagnostics.warn("usd", source, _commentary(item))
+        finally:
+            # The delegate listens until it is destroyed.
+            del delegate
+
+
+def _commentary(item: Any) -> str:
+    """Return what USD says, on one line and without addresses, which no two runs share."""
+    try:
+        return _ADDRESS.sub("", " ".join(str(item.commentary).split()))
+    except UnicodeDecodeError:
+        return "USD met something that is no text"
+
+
+# UsdStage::_ReportErrors, Sdf_CrateFile::_CheckFileVersion, UsdShadeMaterialBindingAPI's BindingsAtPrim (a missing API
+# schema changes nothing).
+_REPORTED_ELSEWHERE = ("_ReportErrors", "_CheckFileVersion", "BindingsAtPrim")
+_ADDRESS = re.compile(r" <0x[0-9a-f]+>")
+_COMMENTARY = re.compile(r"at line \d+ in file \S+ : '(.*?)'\s*(?=\n|$)", re.DOTALL)
+
+
+def usd_reason(error: BaseException) -> str:
+    """Return the first reason in a Tf error, on one line and without USD's own source positions."""
+    try:
+        text = str(error)
+    except UnicodeDecodeError:
+        # USD quotes what it could not read, and that need not be text.
+        return "the file is not what its name or its beginning says"
+    found = _COMMENTARY.findall(text)
+    text = found[0] if found else text
+    text = re.sub(r"pxrInternal_v[0-9_]+pxrReserved__(_pegtl)?::(internal::)?", "", text)
+    return " ".join(text.split())
+
+
+def open_stage(
+    stage_or_path: Any,
+    *,
+    variants: Sequence[str] = (),
+    overrides: Overrides = (),
+    search_paths: Sequence[str | os.PathLike[str]] = (),
+    diagnostics: Diagnostics,
+) -> OpenedStage:
+    """Open a file, or take a stage in memory, with the variants and values asked for.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    StageError
+        The file is no stage, or an override names what is not there.
+    """
+    if isinstance(stage_or_path, Usd.Stage):
+        return _from_memory(stage_or_path, variants, overrides, search_paths)
+    try:
+        path = os.fspath(stage_or_path)
+    except TypeError:
+        raise UsageError(
+            f"stage: is a {type(stage_or_path).__name__}: give the path of a USD file or a pxr.Usd.Stage"
+        ) from None
+    if isinstance(path, bytes):
+        path = os.fsdecode(path)
+    context = _context(path, search_paths, diagnostics)
+    root = _root_layer(path, context)
+    session = _session_layer()
+    stage = _compose(lambda: Usd.Stage.Open(root, session, context), path)
+    opened = OpenedStage(stage, path, [root, session])
+    _apply(opened, session, variants, overrides)
+    return opened
+
+
+def _session_layer() -> Any:
+    return Sdf.Layer.CreateAnonymous("abbe-session.usda")
+
+
+def _context(path: str, search_paths: Sequence[str | os.PathLike[str]], diagnostics: Diagnostics) -> Any:
+    """Return the resolver context: the resolver's own for this file, with the search paths asked for behind it."""
+    resolver = Ar.GetResolver()
+    own = resolver.CreateDefaultContextForAsset(path)
+    if not search_paths:
+        return own
+    folders = [Path(folder).absolute() for folder in search_paths]
+    for folder in folders:
+        if not folder.is_dir():
+            raise UsageError(f"search path {folder}: is no folder: correct or remove it")
+    if not isinstance(Ar.GetUnderlyingResolver(), Ar.DefaultResolver):
+        diagnostics.warn("search-path", path, "the site's own asset resolver is in use; search paths are ignored")
+        return own
+    beside = Path(path).absolute().parent
+    return Ar.ResolverContext(Ar.DefaultResolverContext([str(folder) for folder in (beside, *folders)]))
+
+
+def _root_layer(path: str, context: Any) -> Any:
+    if not path:
+        raise UsageError("stage: the path is empty: give that of a USD file")
+    if Path(path).is_dir():
+        raise StageError(f"{path}: is a folder, not a USD file: name the file in it")
+    with Ar.ResolverContextBinder(context):
+        if not Path(path).exists() and not Ar.GetResolver().Resolve(path):
+            raise FileNotFoundError(f"{path}: there is no such file: check the path")
+        try:
+            layer = Sdf.Layer.FindOrOpen(path)
+        except RuntimeError as error:
+            raise StageError(f"{path}: cannot be read as USD: {usd_reason(error)}: export it again") from None
+    if not layer:
+        raise StageError(f"{path}: is not a USD file (.usda, .usdc, .usd, .usdz), or it cannot be read: check the file")
+    return layer
+
+
+def _compose(open_it: Any, source: str) -> Any:
+    try:
+        stage = open_it()
+    except RuntimeError as error:
+        raise StageError(f"{source}: cannot be composed: {usd_reason(error)}: correct the file") from None
+    if not stage:
+        raise StageError(f"{source}: cannot be composed: correct the file")
+    return stage
+
+
+def _from_memory(
+    stage: Any, variants: Sequence[str], overrides: Overrides, search_paths: Sequence[str | os.PathLike[str]]
+) -> OpenedStage:
+    """Return the caller's stage itself, or, where something is overridden, a second stage on the same layers."""
+    root = stage.GetRootLayer()
+    source = source_name(stage)
+    if search_paths:
+        raise UsageError("search_paths: a stage in memory is composed already: open it with them, or give its path")
+    if not variants and not overrides:
+        return OpenedStage(stage, source)
+    session = _session_layer()
+    theirs = stage.GetSessionLayer()
+    if theirs:
+        # Stage metadata is read from the session's root layer alone.
+        UsdUtils.CopyLayerMetadata(theirs, session, True)
+        session.subLayerPaths = [theirs.identifier]
+    context = stage.GetPathResolverContext()
+    mask = stage.GetPopulationMask()
+    # Payloads are loaded only once the rules are those of the caller's stage.
+    second = _compose(lambda: Usd.Stage.OpenMasked(root, session, context, mask, Usd.Stage.LoadNone), source)
+    second.MuteAndUnmuteLayers(stage.GetMutedLayers(), [])
+    second.SetLoadRules(stage.GetLoadRules())
+    second.SetInterpolationType(stage.GetInterpolationType())
+    opened = OpenedStage(second, source, [stage, root, theirs, session])
+    _apply(opened, session, variants, overrides)
+    return opened
+
+
+def _apply(opened: OpenedStage, session: Any, variants: Sequence[str], overrides: Overrides) -> None:
+    if isinstance(variants, str) or isinstance(overrides, str):
+        raise UsageError("variants, overrides: are lists, not one string: put brackets around it")
+    if not variants and not overrides:
+        return
+    with Usd.EditContext(opened.stage, Usd.EditTarget(session)):
+        for text in variants:
+            _select_variant(opened, text)
+        items = overrides.items() if isinstance(overrides, Mapping) else [_split_override(text) for text in overrides]
+        for target, value in items:
+            _set_value(opened, target, value)
+
+
+_VARIANT = re.compile(r"^(?P<prim>[^{}]+)\{(?P<set>[^{}=]+)=(?P<name>[^{}=]*)\}$")
+
+
+def _select_variant(opened: OpenedStage, text: str) -> None:
+    """Select a variant, given as ``/World/Ball{material=glass}``; USD itself would accept names that do not exist."""
+    match = _VARIANT.match(text.strip())
+    if not match:
+        raise UsageError(
+            f"variant '{text}': is not of the form PRIM{{SET=NAME}}, such as /World/Ball{{material=glass}}"
+        )
+    prim = _prim(opened, match["prim"], f"variant '{text}'")
+    sets = prim.GetVariantSets()
+    if match["set"] not in sets.GetNames():
+        raise StageError(f"{place(prim)}: has no variant set '{match['set']}': {_choice('sets', sets.GetNames())}")
+    variant_set = sets.GetVariantSet(match["set"])
+    if match["name"] not in variant_set.GetVariantNames():
+        choice = _choice("variants", variant_set.GetVariantNames())
+        raise StageError(f"{place(prim)}{{{match['set']}}}: has no variant '{match['name']}': {choice}")
+    variant_set.SetVariantSelection(match["name"])
+
+
+def _choice(what: str, names: Sequence[str]) -> str:
+    return f"choose one of {', '.join(sorted(names))}" if names else f"it has no {what}"
+
+
+def _prim(opened: OpenedStage, path: str, option: str) -> Any:
+    if not Sdf.Path.IsValidPathString(path) or not Sdf.Path(path).IsAbsoluteRootOrPrimPath():
+        raise UsageError(f"{option}: '{path}' is no prim path: give one such as /World/Ball")
+    prim = opened.stage.GetPrimAtPath(Sdf.Path(path).MakeAbsolutePath(Sdf.Path.absoluteRootPath))
+    if not prim:
+        raise StageError(f"<{path}>: there is no such prim in {opened.source}: correct {option}")
+    if prim.IsInstanceProxy() or prim.IsInPrototype():
+        raise StageError(f"{place(prim)}: lies in an instance, which USD does not override: correct {option}")
+    return prim
+
+
+def _split_override(text: str) -> tuple[str, str]:
+    target, equals, value = text.partition("=")
+    if not equals:
+        raise UsageError(f"override '{text}': is not of the form PRIM.ATTR=VALUE, such as /World/Glass.inputs:ior=1.6")
+    return target.strip(), value.strip()
+
+
+def _set_value(opened: OpenedStage, target: str, value: Any) -> None:
+    """Set an attribute of the session layer; text is read as .usda has it, in the attribute's own type."""
+    option = f"override '{target}'"
+    prim_path, dot, name = target.partition(".")
+    if not dot or not name:
+        raise UsageError(f"{option}: is no attribute: give one such as /World/Glass.inputs:ior")
+    prim = _prim(opened, prim_path, option)
+    attribute = prim.GetAttribute(name)
+    if not attribute:
+        attribute = _our_attribute(prim, name)
+    if not attribute:
+        near = sorted(a.GetName() for a in prim.GetAuthoredAttributes())
+        raise StageError(f"{place(prim)}: has no attribute '{name}': {_choice('authored attributes', near)}")
+    if attribute.HasAuthoredConnections():
+        driver = attribute.GetConnections()[0]
+        raise StageError(f"{place(prim)}.{name}: is driven by {place(driver)}, so a value has no effect: set that one")
+    type_name = attribute.GetTypeName()
+    if isinstance(value, str):
+        value = _parse(value, type_name, f"{place(prim)}.{name}")
+    try:
+        done = attribute.Set(value)
+    except (TypeError, RuntimeError):
+        done = False
+    if not done:
+        raise StageError(f"{place(prim)}.{name} = {value}: is no value of type {type_name}: correct {option}")
+
+
+def _our_attribute(prim: Any, name: str) -> Any:
+    """Return an attribute of our own schemas, declared where the prim's type may carry it; else None."""
+    for schema, names in tokens.OUR_SCHEMAS.items():
+        if prim.GetTypeName() == schema and name in names:
+            return prim.CreateAttribute(name, Sdf.ValueTypeNames.Find(names[name]), False)
+    return None
+
+
+def _parse(text: str, type_name: Any, where: str) -> Any:
+    """Return the value that ``text`` means for a type, read by USD's own parser."""
+    name = str(type_name)
+    if name in ("string", "token"):
+        return _unquoted(text)
+    if name == "asset":
+        return Sdf.AssetPath(_unquoted(text.strip("@")))
+    problem = StageError(f"{where} = {text}: is no value of type {name}: write it as .usda does")
+    if "\n" in text or "\r" in text:
+        raise problem
+    if name == "bool":
+        text = {"true": "1", "false": "0"}.get(text.lower(), text)
+    layer = Sdf.Layer.CreateAnonymous("abbe-value.usda")
+    try:
+        read = layer.ImportFromString(f'#usda 1.0\nover "x"\n{{\n    {name} value = {text}\n}}\n')
+    except RuntimeError:
+        read = False
+    spec = layer.GetAttributeAtPath("/x.value") if read else None
+    if spec is None or spec.default is None or len(layer.rootPrims) != 1 or len(layer.rootPrims[0].properties) != 1:
+        raise problem
+    if not set(spec.ListInfoKeys()) <= {"custom", "default", "typeName", "variability"}:
+        raise problem
+    return spec.default
+
+
+def _unquoted(text: str) -> str:
+    return text[1:-1] if len(text) >= 2 and text[0] == text[-1] and text[0] in "\"'" else text
+
+
+def stage_time(stage: Any, frame: float | str | None) -> tuple[Any, float | None]:
+    """Return the time code to read at, and its number (None where it has none).
+
+    None means the stage's authored start; without one the earliest sample of each attribute, as usdrecord has it, so
+    that attributes with time samples alone still have a value. ``"default"`` means the default values.
+    """
+    if isinstance(frame, str):
+        if frame != "default":
+            raise UsageError(f"frame '{frame}': is neither a number nor 'default'")
+        return Usd.TimeCode.Default(), None
+    if frame is None:
+        if not stage.HasAuthoredMetadata(tokens.START_TIME_CODE):
+            return Usd.TimeCode.EarliestTime(), None
+        start = _metadata_number(stage, tokens.START_TIME_CODE)
+        if start is None:
+            return Usd.TimeCode.EarliestTime(), None
+        frame = start
+    frame = float(frame)
+    if not math.isfinite(frame):
+        raise UsageError(f"frame {frame}: is not finite: give a time code")
+    return Usd.TimeCode(frame), frame
+
+
+def _metadata_number(stage: Any, name: str) -> float | None:
+    """Return a number of the stage's metadata, of whatever type it was authored: USD throws at a float for a double.
+
+    The session layer is stronger than the root layer, as in UsdStage.
+    """
+    for layer in (stage.GetSessionLayer(), stage.GetRootLayer()):
+        if layer and layer.pseudoRoot.HasInfo(name):
+            value = layer.pseudoRoot.GetInfo(name)
+            if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+                return float(value)
+    return None
+
+
+# UsdGeom's fallback: centimetres.
+_CENTIMETRES = 0.01
+
+
+def stage_metadata(opened: OpenedStage, time_code: float | None, diagnostics: Diagnostics) -> dict[str, Any]:
+    """Return what the description says of the stage as a whole."""
+    stage = opened.stage
+    metres = _metadata_number(stage, tokens.METERS_PER_UNIT)
+    if metres is not None and metres <= 0.0:
+        diagnostics.warn(
+            "unreadable-attribute",
+            f"{opened.source}.{tokens.METERS_PER_UNIT}",
+            f"{metres:g} metres per unit is no length; centimetres are taken",
+        )
+        metres = None
+    up_axis = stage.GetMetadata(tokens.UP_AXIS)
+    if up_axis not in ("Y", "Z"):
+        diagnostics.warn(
+            "unreadable-attribute", f"{opened.source}.{tokens.UP_AXIS}", f"'{up_axis}' is no up axis; Y is taken"
+        )
+        up_axis = "Y"
+    result: dict[str, Any] = {
+        "source": opened.source,
+        "meters_per_unit": _CENTIMETRES if metres is None else metres,
+        "up_axis": str(up_axis),
+    }
+    if time_code is not None:
+        result["time_code"] = time_code
+    for name in (tokens.FRAMES_PER_SECOND, tokens.TIME_CODES_PER_SECOND):
+        rate = _metadata_number(stage, name)
+        if rate is not None:
+            result["frames_per_second"] = rate
+            break
+    return result
+
+
+def composition_warnings(opened: OpenedStage, missing: str, diagnostics: Diagnostics) -> None:
+    """Warn of everything that did not compose, with the prim it is missing from.
+
+    Raises
+    ------
+    StageError
+        ``missing`` is ``"error"`` and a layer or prim that is referred to is not there.
+    """
+    for error in _composition_errors(opened.stage):
+        site = getattr(error, "rootSite", None)
+        path = getattr(site, "path", None)
+        where = place(path) if path is not None and not path.isEmpty else opened.source
+        text = " ".join(str(error).split())
+        kind = "missing-reference" if isinstance(error, _MISSING) else "composition-error"
+        target = _ASSET.search(text)
+        if kind == "missing-reference" and target and target[1].split(":SDF_FORMAT_ARGS")[0].endswith(".mtlx"):
+            text = (
+                f"@{target[1]}@ is a MaterialX document, which this USD does not read: "
+                "its materials are empty; inline them in the USD file"
+            )
+        if kind == "missing-reference" and missing == "error":
+            raise StageError(f"{where}: {text}: add what is missing, or choose --missing warn")
+        diagnostics.warn(kind, where, text)
+
+
+def _composition_errors(stage: Any) -> list[Any]:
+    if hasattr(stage, "GetCompositionErrors"):
+        return list(stage.GetCompositionErrors())
+    # Before USD 23.05.
+    return [error for prim in stage.TraverseAll() for error in prim.GetPrimIndex().localErrors]
+
+
+_ASSET = re.compile(r"@([^@]+)@")
+_MISSING = tuple(
+    getattr(Pcp, name)
+    for name in (
+        "ErrorInvalidAssetPath",
+        "ErrorInvalidSublayerPath",
+        "ErrorMutedAssetPath",
+        "ErrorUnresolvedPrimPath",
+        "ErrorInvalidReferenceOffset",
+    )
+    if hasattr(Pcp, name)
+)

@@ -1,0 +1,154 @@
+"""Every USD name that the bridge reads by name, once.
+
+The names of our own schemas stand with their types in :data:`MATERIAL_NAMES`, :data:`SETTINGS_NAMES` and
+:data:`VAR_NAMES`; they serve to find misspelt attributes, and a test compares them with ``plugin/``. Attributes are
+read by name, whether or not the schemas are registered or applied.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+# Stage metadata.
+METERS_PER_UNIT: Final = "metersPerUnit"
+UP_AXIS: Final = "upAxis"
+START_TIME_CODE: Final = "startTimeCode"
+RENDER_SETTINGS_PRIM_PATH: Final = "renderSettingsPrimPath"
+FRAMES_PER_SECOND: Final = "framesPerSecond"
+TIME_CODES_PER_SECOND: Final = "timeCodesPerSecond"
+
+# Imageable.
+VISIBILITY: Final = "visibility"
+INVISIBLE: Final = "invisible"
+PURPOSE: Final = "purpose"
+DEFAULT: Final = "default"
+PURPOSES: Final = ("default", "render", "proxy", "guide")
+DEFAULT_PURPOSES: Final = ("default", "render")
+DOUBLE_SIDED: Final = "doubleSided"
+ORIENTATION: Final = "orientation"
+LEFT_HANDED: Final = "leftHanded"
+DRAW_MODE: Final = "model:drawMode"
+APPLY_DRAW_MODE: Final = "model:applyDrawMode"
+FULL_DRAW_MODES: Final = ("default", "inherited", "")
+
+# Sphere.
+RADIUS: Final = "radius"
+
+# Mesh.
+POINTS: Final = "points"
+FACE_VERTEX_COUNTS: Final = "faceVertexCounts"
+FACE_VERTEX_INDICES: Final = "faceVertexIndices"
+HOLE_INDICES: Final = "holeIndices"
+SUBDIVISION_SCHEME: Final = "subdivisionScheme"
+NO_SUBDIVISION: Final = "none"
+NORMALS: Final = "normals"
+PRIMVARS_NORMALS: Final = "primvars:normals"
+PRIMVARS: Final = "primvars"
+PRIMVARS_PREFIX: Final = "primvars:"
+PRIMVAR_INDICES: Final = ":indices"
+PRIMVARS_ST: Final = "primvars:st"
+INTERPOLATION: Final = "interpolation"
+INTERPOLATIONS: Final = ("constant", "uniform", "varying", "vertex", "faceVarying")
+VERTEX: Final = "vertex"
+CONSTANT: Final = "constant"
+TEX_COORD_TYPES: Final = ("texCoord2f[]", "texCoord2d[]", "texCoord2h[]")
+FLOAT2_TYPES: Final = ("float2[]", "double2[]", "half2[]")
+# What other applications call their first texture coordinates (Maya, Houdini, Blender, glTF converters).
+UV_NAMES: Final = ("st", "uv", "map1", "UVMap", "st0", "st_0", "uv0", "Texture_uv", "TEXCOORD_0")
+GEOM_SUBSET: Final = "GeomSubset"
+FAMILY_NAME: Final = "familyName"
+MATERIAL_BIND: Final = "materialBind"
+ELEMENT_TYPE: Final = "elementType"
+FACE: Final = "face"
+INDICES: Final = "indices"
+
+# Materials.
+MATERIAL_BINDING: Final = "material:binding"
+FULL_PURPOSE: Final = "full"
+OUTPUTS_PREFIX: Final = "outputs:"
+INPUTS: Final = "inputs"
+INPUTS_PREFIX: Final = "inputs:"
+# The surface terminals in the order they are looked for; those of other render contexts come after.
+SURFACE_OUTPUTS: Final = ("outputs:abbe:surface", "outputs:mtlx:surface", "outputs:surface")
+CONSTANT_NODE_PREFIX: Final = "ND_constant_"
+CONSTANT_NODE_INPUT: Final = "value"
+
+# Cameras.
+PERSPECTIVE: Final = "perspective"
+CAMERA: Final = "camera"
+
+# Render settings.
+RENDER_SETTINGS: Final = "RenderSettings"
+RENDER_PRODUCT: Final = "RenderProduct"
+RENDER_VAR: Final = "RenderVar"
+PRODUCTS: Final = "products"
+ORDERED_VARS: Final = "orderedVars"
+PRODUCT_NAME: Final = "productName"
+PRODUCT_TYPE: Final = "productType"
+RASTER: Final = "raster"
+RESOLUTION: Final = "resolution"
+PIXEL_ASPECT_RATIO: Final = "pixelAspectRatio"
+ASPECT_RATIO_CONFORM_POLICY: Final = "aspectRatioConformPolicy"
+EXPAND_APERTURE: Final = "expandAperture"
+DATA_WINDOW_NDC: Final = "dataWindowNDC"
+INSTANTANEOUS_SHUTTER: Final = "instantaneousShutter"
+DISABLE_MOTION_BLUR: Final = "disableMotionBlur"
+DISABLE_DEPTH_OF_FIELD: Final = "disableDepthOfField"
+RENDERING_COLOR_SPACE: Final = "renderingColorSpace"
+INCLUDED_PURPOSES: Final = "includedPurposes"
+MATERIAL_BINDING_PURPOSES: Final = "materialBindingPurposes"
+DATA_TYPE: Final = "dataType"
+COLOR3F: Final = "color3f"
+SOURCE_NAME: Final = "sourceName"
+SOURCE_TYPE: Final = "sourceType"
+RAW: Final = "raw"
+# Later ones win, so that RenderMan's spelling yields to the common one.
+DRIVER_NAMESPACES: Final = ("ri:driver:parameters", "driver:parameters")
+AOV_DRIVER_NAMESPACES: Final = ("ri:driver:parameters:aov", "driver:parameters:aov")
+# Product names that mean a window of an application, not a file: Solaris' image viewers.
+VIEWER_PRODUCT_NAMES: Final = ("ip", "md")
+
+# Ours.
+ABBE: Final = "abbe"
+ABBE_PREFIX: Final = "abbe:"
+MATERIAL_NAMES: Final = {
+    "abbe:glass": "string",
+    "abbe:dispersion:law": "token",
+    "abbe:dispersion:nd": "double",
+    "abbe:dispersion:vd": "double",
+    "abbe:dispersion:cauchy": "double[]",
+    "abbe:dispersion:sellmeier:b": "double[]",
+    "abbe:dispersion:sellmeier:c": "double[]",
+    "abbe:dispersion:formula": "int",
+    "abbe:dispersion:coefficients": "double[]",
+    "abbe:dispersion:table": "double2[]",
+    "abbe:extinction:table": "double2[]",
+    "abbe:dispersion:validRange": "double2",
+    "abbe:dispersion:outOfRange": "token",
+    "abbe:dispersion:scale": "double",
+    "abbe:internalTransmittance:table": "double2[]",
+    "abbe:internalTransmittance:thickness": "double",
+    "abbe:dielectricPriority": "int",
+}
+SETTINGS_NAMES: Final = {
+    "abbe:integrator": "token",
+    "abbe:samples": "int",
+    "abbe:errorTarget": "double",
+    "abbe:timeLimit": "double",
+    "abbe:referenceWavelength": "double",
+    "abbe:band": "double2",
+    "abbe:dispersionScale": "double",
+    "abbe:seed": "int",
+    "abbe:seedPerFrame": "bool",
+    "abbe:scalarIor": "token",
+    "abbe:pixelFilter": "token",
+    "abbe:pixelFilterWidth": "float",
+    "abbe:channelWavelengths": "double3",
+}
+VAR_NAMES: Final = {
+    "abbe:filter": "token",
+    "abbe:wavelength": "double",
+    "abbe:spectral:band": "double2",
+    "abbe:spectral:binWidth": "double",
+}
+OUR_SCHEMAS: Final = {"Material": MATERIAL_NAMES, RENDER_SETTINGS: SETTINGS_NAMES, RENDER_VAR: VAR_NAMES}

@@ -1,0 +1,392 @@
+//! The specular chain: from the camera through glass to the first surface that is neither transmissive nor a mirror.
+//!
+//! Deterministic, at one wavelength: transmit at every transmissive interface, reflect where reflection is total and at
+//! smooth mirrors. It ends at the first other surface, at a miss, or after [`MAX_EVENTS`] events. The geometric normal
+//! alone decides entering or leaving; the media around the ray are a stack with priorities.
+
+use glam::DVec3;
+
+use crate::geometry::{Departures, Hit, Ray};
+use crate::optics::IorJet;
+use crate::optics::media::{Inside, MediaStack};
+use crate::ray::{ColumnSet, LocalSurface, RayStart, ScatterKind, Scattering, Step, Transfer};
+use crate::ray::{critical_distance, mirror, refract_or_reflect};
+use crate::scene::material::Kind;
+use crate::scene::view::{Media, View};
+
+/// A chain with more events than this has no end.
+pub const MAX_EVENTS: u32 = 64;
+
+/// Straight crossings (cut-outs, surfaces inside a medium of higher priority) that one chain may make.
+const MAX_CROSSINGS: u32 = 4096;
+
+/// A point on a surface, as a ray met it.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// Which surface, and where on it.
+    pub hit: Hit,
+    /// Render space.
+    pub point: DVec3,
+    /// The surface about the point.
+    pub surface: LocalSurface,
+    /// 1-based, 0 for none.
+    pub material_id: u32,
+}
+
+/// How a chain ends.
+#[derive(Clone, Copy, Debug)]
+pub enum End {
+    /// At a surface that neither transmits nor mirrors.
+    Surface(SurfacePoint),
+    /// In the environment.
+    Miss,
+    /// Nowhere: too many events.
+    Exhausted,
+}
+
+/// What happened to a ray on its way.
+#[derive(Clone, Copy, Debug)]
+pub struct Chain<C> {
+    /// Its end.
+    pub end: End,
+    /// The first surface that is there at all (cut-outs are not).
+    pub first: Option<SurfacePoint>,
+    /// Unit direction of the last segment.
+    pub direction: DVec3,
+    /// Index of the last segment's medium at the chain's wavelength.
+    pub medium: IorJet,
+    /// Columns at the end: transferred to the surface, or leaving the last event for a miss.
+    pub columns: C,
+    /// `material_id` of the first dielectric entered, 0 for none.
+    pub dielectric_id: u32,
+    /// Specular events.
+    pub interfaces: u32,
+    /// Specular events at rough interfaces.
+    pub rough_interfaces: u32,
+    /// Total internal reflections.
+    pub total_reflections: u32,
+    /// Whether some refraction had a medium whose index moves with wavelength: else all λ derivatives are exactly 0.
+    pub is_dispersive: bool,
+    /// The least |δ_c| of all events, nm: how far in wavelength the chain keeps its events (with [`ColumnSet::SECOND`]).
+    pub nearest_critical: f64,
+}
+
+/// What following chains has cost: proof of what was skipped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Counters {
+    /// Rays cast into the scene.
+    pub rays: u64,
+    /// Chains followed.
+    pub chains: u64,
+    /// Refractions, reflections and mirrors.
+    pub events: u64,
+    /// Column updates: events and transfers times the columns carried.
+    pub column_updates: u64,
+    /// Second chains followed along the first-order motion.
+    pub second_chains: u64,
+    /// Chains traced again at another wavelength or pixel.
+    pub retraces: u64,
+    /// Texture coordinates looked up.
+    pub uv_lookups: u64,
+    /// Surfaces left that the ray was never inside of: open or inconsistently oriented glass.
+    pub unmatched_exits: u64,
+    /// Chains that ended after too many events.
+    pub exhausted: u64,
+    /// Events redone with the geometric normal.
+    pub geometric_normal_events: u64,
+}
+
+impl Counters {
+    fn combine(&self, other: &Self, f: impl Fn(u64, u64) -> u64) -> Self {
+        Self {
+            rays: f(self.rays, other.rays),
+            chains: f(self.chains, other.chains),
+            events: f(self.events, other.events),
+            column_updates: f(self.column_updates, other.column_updates),
+            second_chains: f(self.second_chains, other.second_chains),
+            retraces: f(self.retraces, other.retraces),
+            uv_lookups: f(self.uv_lookups, other.uv_lookups),
+            unmatched_exits: f(self.unmatched_exits, other.unmatched_exits),
+            exhausted: f(self.exhausted, other.exhausted),
+            geometric_normal_events: f(self.geometric_normal_events, other.geometric_normal_events),
+        }
+    }
+
+    /// Adds another thread's counts.
+    pub fn add(&mut self, other: &Self) {
+        *self = self.combine(other, |a, b| a + b);
+    }
+
+    /// What was counted since `earlier`.
+    pub fn since(&self, earlier: &Self) -> Self {
+        self.combine(earlier, |now, before| now - before)
+    }
+}
+
+/// Follows chains through one view.
+#[derive(Debug)]
+pub struct Follower<'a> {
+    view: &'a View<'a>,
+    /// The media around the camera.
+    outside: MediaStack,
+}
+
+impl<'a> Follower<'a> {
+    /// For rays that start at the origin of `view`.
+    pub fn new(view: &'a View<'a>) -> Self {
+        Self { view, outside: view.media_at(DVec3::ZERO) }
+    }
+
+    /// The medium around the camera.
+    pub fn start_medium(&self, media: &Media) -> IorJet {
+        media.of(self.outside.current())
+    }
+
+    /// The first surface alone: nothing is followed.
+    pub fn first_surface(&self, start: &RayStart, counters: &mut Counters) -> Option<SurfacePoint> {
+        let mut walk = Walk::new(self, start);
+        loop {
+            let met = walk.advance(counters)?;
+            if !walk.is_cut_out(&met) {
+                return Some(met);
+            }
+            walk.cross(&met);
+            if walk.crossings > MAX_CROSSINGS {
+                return None;
+            }
+        }
+    }
+
+    /// Follows the chain of `start` with the indices of `media`, carrying the columns `C`.
+    ///
+    /// `log` receives every event with its transfer, and the last transfer: what a second chain replays.
+    pub fn follow<C: ColumnSet>(
+        &self,
+        start: &RayStart,
+        media: &Media,
+        mut log: Option<&mut Vec<Step>>,
+        counters: &mut Counters,
+    ) -> Chain<C> {
+        counters.chains += 1;
+        let mut walk = Walk::new(self, start);
+        let mut medium = media.of(walk.media.current());
+        let mut chain = Chain {
+            end: End::Miss,
+            first: None,
+            direction: start.direction,
+            medium,
+            columns: C::start(start, &medium),
+            dielectric_id: 0,
+            interfaces: 0,
+            rough_interfaces: 0,
+            total_reflections: 0,
+            is_dispersive: false,
+            nearest_critical: f64::INFINITY,
+        };
+        let columns_carried = u64::from(C::LAMBDA) + 2 * u64::from(C::SCREEN) + u64::from(C::SECOND);
+        let mut momentum = medium.ior * start.direction;
+        if let Some(log) = log.as_deref_mut() {
+            log.clear();
+        }
+        while let Some(met) = walk.advance(counters) {
+            let cut_out = walk.is_cut_out(&met);
+            if !cut_out && chain.first.is_none() {
+                chain.first = Some(met);
+            }
+            if cut_out {
+                walk.cross(&met);
+                if walk.crossings > MAX_CROSSINGS {
+                    chain.end = End::Exhausted;
+                    break;
+                }
+                continue;
+            }
+            let transfer = Transfer {
+                distance: walk.travelled,
+                direction: walk.ray.direction,
+                medium,
+                n_g: met.surface.n_g,
+                curvature: met.surface.curvature,
+            };
+            let (scattering, rough) = match walk.event(&met, media, &medium, momentum, counters) {
+                Event::End => {
+                    chain.columns.transfer(&transfer);
+                    counters.column_updates += columns_carried;
+                    if let Some(log) = log.as_deref_mut() {
+                        log.push(Step { transfer, scattering: None });
+                    }
+                    chain.end = End::Surface(met);
+                    break;
+                }
+                Event::Straight { is_interface, rough } => {
+                    chain.interfaces += u32::from(is_interface);
+                    chain.rough_interfaces += u32::from(rough);
+                    if is_interface && chain.dielectric_id == 0 {
+                        chain.dielectric_id = met.material_id;
+                    }
+                    if chain.interfaces > MAX_EVENTS || walk.crossings > MAX_CROSSINGS {
+                        chain.end = End::Exhausted;
+                        break;
+                    }
+                    continue;
+                }
+                Event::Scattered { scattering, rough } => (scattering, rough),
+            };
+            chain.interfaces += 1;
+            chain.rough_interfaces += u32::from(rough);
+            counters.events += 1;
+            counters.column_updates += 2 * columns_carried;
+            counters.geometric_normal_events += u64::from(scattering.geometric_normal_used);
+            chain.columns.transfer(&transfer);
+            if C::SECOND
+                && scattering.kind != ScatterKind::Mirror
+                && let Some(col_lambda) = chain.columns.lambda()
+            {
+                chain.nearest_critical = chain.nearest_critical.min(critical_distance(&scattering, col_lambda));
+            }
+            chain.columns.scatter(&scattering);
+            match scattering.kind {
+                ScatterKind::Refraction => {
+                    chain.is_dispersive |= !(scattering.ior_i.is_constant() && scattering.ior_t.is_constant());
+                    if chain.dielectric_id == 0 && !met.hit.leaving {
+                        chain.dielectric_id = met.material_id;
+                    }
+                    medium = scattering.ior_t;
+                }
+                ScatterKind::TotalReflection => chain.total_reflections += 1,
+                ScatterKind::Mirror => {}
+            }
+            momentum = scattering.momentum_out;
+            walk.turn(&met, momentum / medium.ior, &scattering);
+            if let Some(log) = log.as_deref_mut() {
+                log.push(Step { transfer, scattering: Some(scattering) });
+            }
+            if chain.interfaces > MAX_EVENTS {
+                chain.end = End::Exhausted;
+                break;
+            }
+        }
+        counters.exhausted += u64::from(matches!(chain.end, End::Exhausted));
+        chain.direction = walk.ray.direction;
+        chain.medium = medium;
+        chain
+    }
+}
+
+/// What a surface does to the chain.
+enum Event {
+    End,
+    Straight { is_interface: bool, rough: bool },
+    Scattered { scattering: Scattering, rough: bool },
+}
+
+/// A ray on its way, with the media around it.
+struct Walk<'a> {
+    view: &'a View<'a>,
+    ray: Ray,
+    media: MediaStack,
+    departures: Departures,
+    /// From the last event to the last surface met.
+    travelled: f64,
+    crossings: u32,
+}
+
+impl<'a> Walk<'a> {
+    fn new(follower: &Follower<'a>, start: &RayStart) -> Self {
+        Self {
+            view: follower.view,
+            ray: Ray { origin: start.point, direction: start.direction },
+            media: follower.outside.clone(),
+            departures: Departures::none(),
+            travelled: 0.0,
+            crossings: 0,
+        }
+    }
+
+    /// The next surface.
+    fn advance(&mut self, counters: &mut Counters) -> Option<SurfacePoint> {
+        counters.rays += 1;
+        let hit = self.view.intersect(&self.ray, &self.departures)?;
+        let (point, surface) = self.view.aggregate.local_surface(&self.ray, &hit);
+        self.travelled += hit.distance;
+        Some(SurfacePoint { hit, point, surface, material_id: self.view.material_id(&hit) })
+    }
+
+    fn is_cut_out(&self, met: &SurfacePoint) -> bool {
+        met.material_id > 0 && matches!(self.view.scene.materials[met.material_id as usize - 1].kind, Kind::PassThrough)
+    }
+
+    /// Goes straight on through the surface.
+    fn cross(&mut self, met: &SurfacePoint) {
+        self.crossings += 1;
+        self.departures.depart(&self.ray, &met.hit, met.hit.leaving);
+        self.ray.origin = met.point;
+    }
+
+    /// Goes on from the surface in a new direction.
+    fn turn(&mut self, met: &SurfacePoint, direction: DVec3, scattering: &Scattering) {
+        let outward = if scattering.kind == ScatterKind::Refraction { met.hit.leaving } else { !met.hit.leaving };
+        self.departures.depart(&self.ray, &met.hit, outward);
+        self.ray = Ray { origin: met.point, direction: direction.normalize() };
+        self.travelled = 0.0;
+    }
+
+    /// What happens at the surface; straight crossings are made at once.
+    fn event(
+        &mut self,
+        met: &SurfacePoint,
+        media: &Media,
+        medium: &IorJet,
+        momentum: DVec3,
+        counters: &mut Counters,
+    ) -> Event {
+        let Some(material) = met.material_id.checked_sub(1).map(|i| &self.view.scene.materials[i as usize]) else {
+            return Event::End;
+        };
+        match &material.kind {
+            Kind::Opaque => Event::End,
+            Kind::PassThrough => {
+                self.cross(met);
+                Event::Straight { is_interface: false, rough: false }
+            }
+            Kind::Mirror => Event::Scattered { scattering: mirror(momentum, &met.surface, medium), rough: false },
+            &Kind::Dielectric { thin_walled: true, rough, .. } => {
+                self.cross(met);
+                Event::Straight { is_interface: true, rough }
+            }
+            &Kind::Dielectric { rough, .. } => {
+                let inside = self.view.inside(&met.hit, met.material_id).expect("a dielectric fills a volume");
+                let current = self.media.current();
+                let next = if met.hit.leaving {
+                    self.media.preview_leave(&inside)
+                } else {
+                    Ok(self.media.preview_enter(&inside))
+                };
+                let Ok(next) = next else {
+                    counters.unmatched_exits += 1;
+                    self.cross(met);
+                    return Event::Straight { is_interface: false, rough: false };
+                };
+                if next == current {
+                    // The same medium on both sides: no optics, and the columns do not notice.
+                    self.change_media(met, inside);
+                    self.cross(met);
+                    return Event::Straight { is_interface: false, rough: false };
+                }
+                let scattering = refract_or_reflect(momentum, &met.surface, medium, &media.of(next));
+                if scattering.kind == ScatterKind::Refraction {
+                    self.change_media(met, inside);
+                }
+                Event::Scattered { scattering, rough }
+            }
+        }
+    }
+
+    fn change_media(&mut self, met: &SurfacePoint, inside: Inside) {
+        if met.hit.leaving {
+            self.media.leave(&inside);
+        } else {
+            self.media.enter(inside);
+        }
+    }
+}

@@ -1,0 +1,497 @@
+//! `differentials`: no light transport. Follows the specular chain of each sample and fills the geometric and
+//! differential AOVs.
+//!
+//! All derivatives are taken at the reference wavelength. Where no refraction of the chain has a dispersive medium they
+//! are 0 and valid; on a miss those of position are absent; a chain without an end has none at all.
+
+use glam::{DVec2, DVec3};
+
+use super::chain::{Chain, Counters, End, Follower, SurfacePoint};
+use super::{Columns, Integrator, PreparedIntegrator, Task, Worker};
+use crate::error::Result;
+use crate::film::aov::{AOVS, Aov, Family};
+use crate::film::pixel::PixelAccumulator;
+use crate::optics::IorJet;
+use crate::ray::{
+    ColumnSet, LambdaColumn, NoColumns, RayStart, ScreenColumns, SecondOrderColumns, Step, direction_derivative,
+    direction_second_derivative, half_width, screen_motion, second_order_along,
+};
+use crate::scene::material::Kind;
+use crate::scene::view::{Media, View};
+
+/// The integrator; it has no settings of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Differentials;
+
+impl Integrator for Differentials {
+    fn name(&self) -> &str {
+        "differentials"
+    }
+
+    fn summary(&self) -> &str {
+        "no light transport: follows the specular chain of each pixel and fills the geometric and differential AOVs"
+    }
+
+    fn aovs(&self) -> Vec<&'static Aov> {
+        AOVS.iter().collect()
+    }
+
+    fn prepare<'a>(&self, task: &'a Task<'a>) -> Result<Box<dyn PreparedIntegrator + 'a>> {
+        Ok(Box::new(Prepared::new(task)?))
+    }
+}
+
+/// One value of the table, resolved once per render.
+#[derive(Clone, Copy, Debug)]
+enum Output {
+    DirectionByLambda,
+    PositionByLambda,
+    Footprint,
+    HalfWidth,
+    Motion,
+    Motion2,
+    Fetch(usize),
+    Ior,
+    IorByLambda,
+    AbbeNumber,
+    Interfaces,
+    RoughInterfaces,
+    TotalReflections,
+    Surface(SurfaceValue, Whose),
+}
+
+#[derive(Clone, Copy, Debug)]
+enum SurfaceValue {
+    Depth,
+    Position,
+    Normal,
+    NormalGeometric,
+    Uv,
+    PrimId,
+    InstanceId,
+    MaterialId,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Whose {
+    First,
+    Chain,
+}
+
+impl Output {
+    fn of(aov: &Aov) -> Self {
+        let (name, whose) = match aov.name.strip_prefix("refracted_") {
+            Some(rest) => (rest, Whose::Chain),
+            None => (aov.name, Whose::First),
+        };
+        let value = match name {
+            "ddirection_dlambda" => return Self::DirectionByLambda,
+            "dposition_dlambda" => return Self::PositionByLambda,
+            "dispersion_footprint" => return Self::Footprint,
+            "footprint_half_width" => return Self::HalfWidth,
+            "dispersion" => return Self::Motion,
+            "dispersion2" => return Self::Motion2,
+            "dispersion_r" => return Self::Fetch(0),
+            "dispersion_g" => return Self::Fetch(1),
+            "dispersion_b" => return Self::Fetch(2),
+            "ior" => return Self::Ior,
+            "dior_dlambda" => return Self::IorByLambda,
+            "abbe_number" => return Self::AbbeNumber,
+            "interfaces" => return Self::Interfaces,
+            "rough_interfaces" => return Self::RoughInterfaces,
+            "total_reflections" => return Self::TotalReflections,
+            "depth" => SurfaceValue::Depth,
+            "position" => SurfaceValue::Position,
+            "normal" => SurfaceValue::Normal,
+            "normal_geometric" => SurfaceValue::NormalGeometric,
+            "uv" => SurfaceValue::Uv,
+            "prim_id" => SurfaceValue::PrimId,
+            "instance_id" => SurfaceValue::InstanceId,
+            "material_id" => SurfaceValue::MaterialId,
+            other => unreachable!("the AOV '{other}' is in the table but not in this integrator"),
+        };
+        Self::Surface(value, whose)
+    }
+}
+
+struct Prepared<'a> {
+    task: &'a Task<'a>,
+    follower: Follower<'a>,
+    media: Media,
+    /// At the wavelengths of the R, G, B responses; empty unless a layer asks for it.
+    channel_media: Vec<Media>,
+    outputs: Vec<Output>,
+    /// Whether some layer tells about the first surface.
+    needs_first: bool,
+}
+
+impl<'a> Prepared<'a> {
+    fn new(task: &'a Task<'a>) -> Result<Self> {
+        let scene = task.view.scene;
+        let media = |wavelength| Media::at(scene, wavelength, task.optics.dispersion_scale);
+        let channels: &[_] = if task.needs.retrace { &task.optics.channels } else { &[] };
+        Ok(Self {
+            task,
+            follower: Follower::new(task.view),
+            media: media(task.optics.reference)?,
+            channel_media: channels.iter().map(|&wavelength| media(wavelength)).collect::<Result<_>>()?,
+            outputs: task.aovs.iter().map(|aov| Output::of(aov)).collect(),
+            needs_first: task.aovs.iter().any(|aov| aov.family == Family::FirstSurface),
+        })
+    }
+}
+
+impl PreparedIntegrator for Prepared<'_> {
+    fn worker(&self) -> Box<dyn Worker + '_> {
+        let counters = Counters::default();
+        let log = Vec::new();
+        match self.task.needs.columns {
+            Columns::None => {
+                Box::new(Carrier::<NoColumns> { prepared: self, counters, log, columns: Default::default() })
+            }
+            Columns::Lambda => {
+                Box::new(Carrier::<LambdaColumn> { prepared: self, counters, log, columns: Default::default() })
+            }
+            Columns::Screen => {
+                Box::new(Carrier::<ScreenColumns> { prepared: self, counters, log, columns: Default::default() })
+            }
+            Columns::SecondOrder => {
+                Box::new(Carrier::<SecondOrderColumns> { prepared: self, counters, log, columns: Default::default() })
+            }
+        }
+    }
+}
+
+/// A worker that carries the columns `C`.
+struct Carrier<'a, C> {
+    prepared: &'a Prepared<'a>,
+    counters: Counters,
+    log: Vec<Step>,
+    columns: std::marker::PhantomData<C>,
+}
+
+impl<C: ColumnSet> Worker for Carrier<'_, C> {
+    fn render(&mut self, pixel: [i32; 2], out: &mut PixelAccumulator) {
+        let task = self.prepared.task;
+        for index in task.samples.begin..task.samples.end {
+            let [dx, dy] = task.sampler.position(pixel, index);
+            self.sample([f64::from(pixel[0]) + dx, f64::from(pixel[1]) + dy], out);
+        }
+    }
+
+    fn counters(&self) -> Counters {
+        self.counters
+    }
+}
+
+impl<C: ColumnSet> Carrier<'_, C> {
+    fn sample(&mut self, raster: [f64; 2], out: &mut PixelAccumulator) {
+        let Prepared { task, follower, media, .. } = self.prepared;
+        let start = task.camera.ray(raster[0], raster[1]);
+        if !task.needs.chain {
+            let first = follower.first_surface(&start, &mut self.counters);
+            for (layer, &output) in self.prepared.outputs.iter().enumerate() {
+                if let Output::Surface(value, _) = output {
+                    self.surface_value(value, layer, &start, first.as_ref(), out);
+                }
+            }
+            return;
+        }
+        let log = task.needs.second_chain.then_some(&mut self.log);
+        let chain = follower.follow::<C>(&start, media, log, &mut self.counters);
+        let sample = Sample { task, chain: &chain, end: EndState::new(&chain) };
+        let end_surface = match &chain.end {
+            End::Surface(point) => Some(point),
+            End::Miss | End::Exhausted => None,
+        };
+        let first = if self.prepared.needs_first { chain.first.as_ref() } else { None };
+        for (layer, &output) in self.prepared.outputs.iter().enumerate() {
+            match output {
+                Output::DirectionByLambda => out.add(layer, sample.direction_by_lambda()),
+                Output::PositionByLambda => out.add(layer, sample.position_by_lambda()),
+                Output::Footprint => out.add(layer, scalar(sample.footprint())),
+                Output::HalfWidth => out.add(layer, scalar(sample.half_width())),
+                Output::Motion => out.add(layer, sample.visible_motion()),
+                Output::Motion2 => {
+                    let motion2 = sample.motion2(&start, follower.start_medium(media), &self.log, &mut self.counters);
+                    out.add(layer, motion2);
+                }
+                Output::Fetch(channel) => {
+                    let offset = self.fetch_offset(raster, &start, &sample, channel);
+                    out.add(layer, offset);
+                }
+                Output::Ior => {
+                    let ior = sample.dielectric().map(|_| media.of_material(chain.dielectric_id).ior);
+                    out.add(layer, scalar(ior));
+                }
+                Output::IorByLambda => {
+                    let dior = sample.dielectric().map(|_| media.of_material(chain.dielectric_id).dior_dlambda);
+                    out.add(layer, scalar(dior));
+                }
+                Output::AbbeNumber => {
+                    let scale = task.optics.dispersion_scale;
+                    let number = sample.dielectric().and_then(|kind| match kind {
+                        Kind::Dielectric { dispersion, .. } => dispersion.scaled(scale).ok()?.abbe_number(),
+                        _ => None,
+                    });
+                    out.add(layer, scalar(number));
+                }
+                Output::Interfaces => out.add_first(layer, chain.interfaces),
+                Output::RoughInterfaces => out.add_first(layer, chain.rough_interfaces),
+                Output::TotalReflections => out.add_first(layer, chain.total_reflections),
+                Output::Surface(value, Whose::First) => self.surface_value(value, layer, &start, first, out),
+                Output::Surface(value, Whose::Chain) => {
+                    self.surface_value(
+                        value,
+                        layer,
+                        &RayStart { direction: chain.direction, ..start },
+                        end_surface,
+                        out,
+                    );
+                }
+            }
+        }
+    }
+
+    /// Adds one value of the surface `met`, which a ray reached along `arriving.direction`.
+    fn surface_value(
+        &mut self,
+        value: SurfaceValue,
+        layer: usize,
+        arriving: &RayStart,
+        met: Option<&SurfacePoint>,
+        out: &mut PixelAccumulator,
+    ) {
+        let task = self.prepared.task;
+        let view: &View<'_> = task.view;
+        let object = met.map(|met| &view.scene.objects[met.hit.instance as usize]);
+        match value {
+            SurfaceValue::Depth => out.add(layer, scalar(met.map(|met| task.camera.depth(met.point)))),
+            SurfaceValue::Position => out.add(layer, met.map(|met| view.origin + met.point)),
+            SurfaceValue::Normal => {
+                let facing = |met: &SurfacePoint| {
+                    let n_s = met.surface.n_s;
+                    if arriving.direction.dot(met.surface.n_g) > 0.0 { -n_s } else { n_s }
+                };
+                out.add(layer, met.map(facing));
+            }
+            SurfaceValue::NormalGeometric => out.add(layer, met.map(|met| met.surface.n_g)),
+            SurfaceValue::Uv => {
+                self.counters.uv_lookups += u64::from(met.is_some());
+                let uv = met.and_then(|met| view.aggregate.uv(&met.hit, met.point));
+                out.add(layer, uv);
+            }
+            SurfaceValue::PrimId => out.add_first(layer, object.map_or(0, |o| o.prim_id)),
+            SurfaceValue::InstanceId => out.add_first(layer, object.map_or(0, |o| o.instance_id)),
+            SurfaceValue::MaterialId => out.add_first(layer, met.map_or(0, |met| met.material_id)),
+        }
+    }
+
+    /// Exact displacement at a channel's wavelength as a fetch offset: what is seen at `raster` there, is seen at
+    /// `raster` + offset at the reference wavelength. Newton's method with the screen columns, started from the
+    /// first-order motion, until a step no longer changes the offset.
+    fn fetch_offset(
+        &mut self,
+        raster: [f64; 2],
+        start: &RayStart,
+        sample: &Sample<'_, C>,
+        channel: usize,
+    ) -> Option<DVec2> {
+        /// Newton doubles the digits at each step: eight reach the last one from any start that converges at all.
+        const MAX_STEPS: usize = 8;
+        /// Where steps below this many pixels stop to shrink is decided by rounding of the hit point: a thousandth of
+        /// what an EXR float can tell at one pixel.
+        const CONVERGED: f64 = 1e-10;
+        /// Offsets that still move by more than this have no digits worth writing.
+        const ACCEPTED: f64 = 1e-6;
+
+        let Prepared { task, follower, media, channel_media, .. } = self.prepared;
+        if !sample.chain.is_dispersive {
+            return sample.end.exists().then_some(DVec2::ZERO);
+        }
+        self.counters.retraces += 1;
+        let target = follower.follow::<NoColumns>(start, &channel_media[channel], None, &mut self.counters);
+        let seen = EndState::new(&target);
+        let delta = task.optics.channels[channel].nanometers() - task.optics.reference.nanometers();
+        let mut offset = sample.motion().map_or(DVec2::ZERO, |motion| -motion * delta);
+        let mut last_step = f64::INFINITY;
+        for _ in 0..MAX_STEPS {
+            let moved = task.camera.ray(raster[0] + offset.x, raster[1] - offset.y);
+            self.counters.retraces += 1;
+            let chain = follower.follow::<ScreenColumns>(&moved, media, None, &mut self.counters);
+            if chain.interfaces != target.interfaces || chain.total_reflections != target.total_reflections {
+                return None;
+            }
+            let here = EndState::new(&chain);
+            let residual = here.difference_to(&seen)?;
+            let [v_x, v_y] = here.screen_columns(&chain)?;
+            let step = screen_motion(v_x, v_y, -residual, here.normal)?;
+            offset += step;
+            let length = step.length();
+            if length <= CONVERGED || (length >= last_step && length <= ACCEPTED) {
+                return Some(offset);
+            }
+            last_step = length;
+        }
+        (last_step <= ACCEPTED).then_some(offset)
+    }
+}
+
+fn scalar(value: Option<f64>) -> Option<[f64; 1]> {
+    value.map(|v| [v])
+}
+
+/// The end of a chain as screen motion sees it: a point on a surface, or a direction.
+#[derive(Clone, Copy)]
+struct EndState {
+    kind: EndKind,
+    /// The point or the direction.
+    value: DVec3,
+    /// n_g or the direction.
+    normal: DVec3,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum EndKind {
+    Surface,
+    Miss,
+    None,
+}
+
+impl EndState {
+    fn new<C>(chain: &Chain<C>) -> Self {
+        match &chain.end {
+            End::Surface(met) => Self { kind: EndKind::Surface, value: met.point, normal: met.surface.n_g },
+            End::Miss => Self { kind: EndKind::Miss, value: chain.direction, normal: chain.direction },
+            End::Exhausted => Self { kind: EndKind::None, value: DVec3::ZERO, normal: DVec3::ZERO },
+        }
+    }
+
+    fn exists(&self) -> bool {
+        self.kind != EndKind::None
+    }
+
+    /// From here to `other`, if both are of one kind.
+    fn difference_to(&self, other: &Self) -> Option<DVec3> {
+        (self.kind == other.kind && self.exists()).then(|| other.value - self.value)
+    }
+
+    /// ∂/∂x and ∂/∂y of the point or direction.
+    fn screen_columns<C: ColumnSet>(&self, chain: &Chain<C>) -> Option<[DVec3; 2]> {
+        let columns = chain.columns.screen()?;
+        match self.kind {
+            EndKind::Surface => Some(columns.map(|c| c.point)),
+            EndKind::Miss => {
+                Some(columns.map(|c| direction_derivative(c.momentum, chain.direction, chain.medium.ior, 0.0)))
+            }
+            EndKind::None => None,
+        }
+    }
+}
+
+/// One followed chain with what can be said of its derivatives.
+struct Sample<'a, C> {
+    task: &'a Task<'a>,
+    chain: &'a Chain<C>,
+    end: EndState,
+}
+
+impl<C: ColumnSet> Sample<'_, C> {
+    fn direction_by_lambda(&self) -> Option<DVec3> {
+        let chain = self.chain;
+        if !self.end.exists() {
+            return None;
+        }
+        match chain.columns.lambda() {
+            Some(col_lambda) if chain.is_dispersive => Some(direction_derivative(
+                col_lambda.momentum,
+                chain.direction,
+                chain.medium.ior,
+                chain.medium.dior_dlambda,
+            )),
+            _ => Some(DVec3::ZERO),
+        }
+    }
+
+    fn position_by_lambda(&self) -> Option<DVec3> {
+        if self.end.kind != EndKind::Surface {
+            return None;
+        }
+        match self.chain.columns.lambda() {
+            Some(col_lambda) if self.chain.is_dispersive => Some(col_lambda.point),
+            _ => Some(DVec3::ZERO),
+        }
+    }
+
+    fn footprint(&self) -> Option<f64> {
+        self.position_by_lambda().map(|p_lambda| p_lambda.length() * self.task.optics.band_width())
+    }
+
+    fn half_width(&self) -> Option<f64> {
+        let half_band = 0.5 * self.task.optics.band_width();
+        if !self.end.exists() {
+            return None;
+        }
+        let (Some(col_lambda), Some(lambda2), true) =
+            (self.chain.columns.lambda(), self.chain.columns.lambda2(), self.chain.is_dispersive)
+        else {
+            return Some(half_band);
+        };
+        let (first, second) = if self.end.kind == EndKind::Surface {
+            (col_lambda.point, lambda2.point)
+        } else {
+            // Infinitely far away the footprint is one of directions.
+            let first = self.direction_by_lambda()?;
+            let medium = &self.chain.medium;
+            (first, direction_second_derivative(lambda2.momentum, self.chain.direction, first, medium))
+        };
+        Some(half_width(first, second, half_band, self.chain.nearest_critical))
+    }
+
+    /// Motion on screen per nanometre, however large.
+    fn motion(&self) -> Option<DVec2> {
+        if !self.end.exists() {
+            return None;
+        }
+        if !self.chain.is_dispersive {
+            return Some(DVec2::ZERO);
+        }
+        let [v_x, v_y] = self.end.screen_columns(self.chain)?;
+        let v_lambda = if self.end.kind == EndKind::Surface {
+            self.chain.columns.lambda()?.point
+        } else {
+            self.direction_by_lambda()?
+        };
+        screen_motion(v_x, v_y, v_lambda, self.end.normal)
+    }
+
+    /// Absent where 1 nm moves more than the image's diagonal: a caustic as seen from the eye.
+    fn visible_motion(&self) -> Option<DVec2> {
+        let [width, height] = self.task.resolution.map(f64::from);
+        self.motion().filter(|motion| motion.length_squared() <= width * width + height * height)
+    }
+
+    fn motion2(&self, start: &RayStart, start_medium: IorJet, log: &[Step], counters: &mut Counters) -> Option<DVec2> {
+        let motion = self.visible_motion()?;
+        if !self.chain.is_dispersive {
+            return Some(DVec2::ZERO);
+        }
+        counters.second_chains += 1;
+        let along = second_order_along(start, &start_medium, motion.extend(1.0), log);
+        let [v_x, v_y] = self.end.screen_columns(self.chain)?;
+        let second = if self.end.kind == EndKind::Surface {
+            along.point2
+        } else {
+            let medium = &self.chain.medium;
+            let first = direction_derivative(along.momentum, self.chain.direction, medium.ior, medium.dior_dlambda);
+            direction_second_derivative(along.momentum2, self.chain.direction, first, medium)
+        };
+        screen_motion(v_x, v_y, second, self.end.normal)
+    }
+
+    /// The first dielectric entered.
+    fn dielectric(&self) -> Option<&Kind> {
+        let id = self.chain.dielectric_id.checked_sub(1)?;
+        Some(&self.task.view.scene.materials[id as usize].kind)
+    }
+}

@@ -1,0 +1,143 @@
+//! The header of an image: everything that is needed to use its numbers without this manual.
+
+use serde_json::json;
+
+use super::Plan;
+use crate::camera::Camera;
+use crate::film::aov::Merge;
+use crate::film::metadata::{Attribute, Metadata};
+use crate::scene::Scene;
+use crate::spectrum::Wavelength;
+use glam::{DMat4, DVec4};
+
+/// CIE x, y of the Rec.709 primaries and D65: the space of colour channels, stated even where a file has none.
+const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
+
+/// What a film of `plan` says about itself. Times and machines are left out, so that the same render gives the same bytes.
+pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bool) -> Metadata {
+    let mut metadata = Metadata { compression: plan.compression.clone(), ..Metadata::default() };
+    let mut set = |name: &str, value| metadata.set(name, value);
+    let text = |value: &str| Attribute::Text(value.to_owned());
+    let stage = &scene.document().stage;
+    let nm = |w: Wavelength| w.nanometers();
+    let [low, high] = plan.optics.band.map(nm);
+
+    set("abbe:version", text(env!("CARGO_PKG_VERSION")));
+    set("abbe:stage", text(&stage.source));
+    set("abbe:integrator", text(&plan.integrator));
+    set("abbe:referenceWavelength", Attribute::Double(nm(plan.optics.reference)));
+    set("abbe:referenceWavelengthText", Attribute::Text(format!("{} nm", nm(plan.optics.reference))));
+    set("abbe:band", Attribute::Text(format!("{low}:{high} nm")));
+    let [r, g, b] = plan.optics.channels.map(nm);
+    set("abbe:channelWavelengths", Attribute::Text(format!("R {r} nm, G {g} nm, B {b} nm")));
+    set("abbe:dispersionScale", Attribute::Double(plan.optics.dispersion_scale));
+    set(
+        "abbe:axes",
+        text("pixel vectors: +x right, +y up, full-raster pixels; vectors and positions: the stage's world"),
+    );
+    set(
+        "abbe:sign",
+        text(
+            "dispersion: motion of the feature seen here per nm of increasing wavelength; dispersion_r/_g/_b: fetch offset, \
+             look up the image here + offset",
+        ),
+    );
+    set("abbe:metersPerUnit", Attribute::Double(stage.meters_per_unit));
+    set("abbe:upAxis", text(&stage.up_axis));
+    set("abbe:camera", text(&plan.camera_path));
+    if let Some(time) = stage.time_code {
+        set("abbe:timeCode", Attribute::Double(time));
+    }
+    set("abbe:samples", Attribute::Int(plan.samples.total as i32));
+    set("abbe:seed", Attribute::Text(plan.seed.to_string()));
+    set("abbe:settingsHash", Attribute::Text(settings_hash(scene, plan)));
+    set("abbe:complete", Attribute::Int(i32::from(complete)));
+    for layer in &plan.layers {
+        set(&format!("abbe:unit:{}", layer.name), text(layer.aov.unit));
+        if layer.name != layer.aov.name {
+            set(&format!("abbe:aov:{}", layer.name), text(layer.aov.name));
+        }
+    }
+    let has_ids =
+        |what: &str| plan.layers.iter().any(|layer| layer.aov.merge == Merge::First && layer.aov.name.contains(what));
+    for (name, paths, wanted) in [
+        ("abbe:primManifest", &scene.prims, has_ids("prim_id")),
+        ("abbe:instanceManifest", &scene.instances, has_ids("instance_id")),
+    ] {
+        if wanted {
+            set(name, Attribute::Text(json!(paths).to_string()));
+        }
+    }
+    if has_ids("material_id") {
+        let paths: Vec<_> = scene.materials.iter().map(|m| &m.path).collect();
+        set("abbe:materialManifest", Attribute::Text(json!(paths).to_string()));
+    }
+    let laws: serde_json::Map<_, _> = plan.materials.iter().map(|d| (d.what.clone(), json!(d.why))).collect();
+    set("abbe:materials", Attribute::Text(serde_json::Value::Object(laws).to_string()));
+
+    set("chromaticities", Attribute::Chromaticities(REC709));
+    if let Some(rate) = stage.frames_per_second.filter(|rate| *rate > 0.0 && *rate < 1e6) {
+        // Film and video rates are n or n·1000/1001.
+        let (n, d) = if rate.fract() == 0.0 { (rate as i32, 1) } else { ((rate * 1001.0).round() as i32, 1001) };
+        set("framesPerSecond", Attribute::Rational(n, d));
+    }
+    let (to_camera, to_ndc) = matrices(camera);
+    set("worldToCamera", Attribute::Matrix(to_camera));
+    set("worldToNDC", Attribute::Matrix(to_ndc));
+    metadata
+}
+
+/// World to camera (left-handed, +z forward, as OpenEXR wants it) and world to NDC (origin top-left, y down, z unused),
+/// row-major for row vectors.
+fn matrices(camera: &Camera) -> ([f32; 16], [f32; 16]) {
+    let camera_from_world = camera.world_from_camera.inverse();
+    let flip_z = DMat4::from_diagonal(DVec4::new(1.0, 1.0, -1.0, 1.0));
+    let to_camera = flip_z * camera_from_world;
+    // A raster position is linear in the camera's homogeneous coordinates; `Camera` has the window and the centre.
+    let [width, height] = camera.window;
+    let (cx, cy) = camera.window_centre();
+    let (sx, sy) = (1.0 / width, -1.0 / height);
+    let (ox, oy) = (0.5 - cx / width, 0.5 + cy / height);
+    let projection = if camera.is_orthographic {
+        DMat4::from_cols(
+            DVec4::new(sx, 0.0, 0.0, 0.0),
+            DVec4::new(0.0, sy, 0.0, 0.0),
+            DVec4::new(0.0, 0.0, 1.0, 0.0),
+            DVec4::new(ox, oy, 0.0, 1.0),
+        )
+    } else {
+        DMat4::from_cols(
+            DVec4::new(sx, 0.0, 0.0, 0.0),
+            DVec4::new(0.0, sy, 0.0, 0.0),
+            DVec4::new(ox, oy, 1.0, 1.0),
+            DVec4::new(0.0, 0.0, 0.0, 0.0),
+        )
+    };
+    let flat = |m: DMat4| m.to_cols_array().map(|v| v as f32);
+    (flat(to_camera), flat(projection * to_camera))
+}
+
+/// A fingerprint of everything that decides the pixels but the part of them that is rendered.
+fn settings_hash(scene: &Scene, plan: &Plan) -> String {
+    let layers: Vec<_> = plan.layers.iter().map(|layer| (&layer.name, layer.aov.name)).collect();
+    let decisive = json!({
+        "camera": scene.document().cameras[plan.camera],
+        "resolution": plan.resolution,
+        "pixelAspectRatio": plan.pixel_aspect_ratio,
+        "conformPolicy": format!("{:?}", plan.conform_policy),
+        "samples": plan.samples.total,
+        "seed": plan.seed,
+        "integrator": plan.integrator,
+        "optics": plan.optics,
+        "layers": layers,
+        "materials": plan.materials,
+        "objects": scene.counts.objects,
+        "triangles": scene.counts.triangles,
+    });
+    // FNV-1a (Fowler, Noll, Vo): tells settings apart, guards nothing.
+    let hash = decisive
+        .to_string()
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
+    format!("{hash:016x}")
+}

@@ -1,0 +1,39 @@
+//! What a caller asks for: everything optional, everything above what the stage says.
+
+use serde::{Deserialize, Serialize};
+
+/// A request; what it leaves open is taken from the stage's product, then its settings, then the defaults.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Request {
+    /// Path of a camera of the scene.
+    pub camera: Option<String>,
+    /// Path of the one product to render.
+    pub product: Option<String>,
+    /// Pixels; alone, it keeps the authored aspect.
+    pub width: Option<u32>,
+    /// Pixels; alone, it keeps the authored aspect.
+    pub height: Option<u32>,
+    /// Samples per pixel.
+    pub samples: Option<u32>,
+    /// Name of an integrator.
+    pub integrator: Option<String>,
+    /// AOVs, in the order of the film's layers; the stage's RenderVars if absent.
+    pub aovs: Option<Vec<String>>,
+    /// Reference wavelength, nm.
+    pub wavelength: Option<f64>,
+    /// Band of footprints and half-widths, nm.
+    pub band: Option<[f64; 2]>,
+    /// Multiplies all dispersion: 0 none, 1 physical.
+    pub dispersion_scale: Option<f64>,
+    /// Seed of the sample positions.
+    pub seed: Option<u64>,
+    /// Threads; all of the machine's if absent or 0. Never changes a bit of the image.
+    pub threads: Option<usize>,
+    /// Pixels to render: x0, y0, x1, y1, half-open, y down.
+    pub crop: Option<[i32; 4]>,
+    /// Samples to render: begin, end, half-open; aligned as [`is_aligned`](crate::film::sum::is_aligned) says.
+    pub sample_range: Option<[u32; 2]>,
+    /// Turns what would be a warning about the request into an error.
+    pub strict: bool,
+}

@@ -1,0 +1,91 @@
+//! Every event of one sample's chain with its columns: what `abbe trace` prints.
+
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use super::Plan;
+use crate::error::{Error, Result};
+use crate::integrator::chain::{Chain, Counters, End, Follower};
+use crate::ray::{Column, ColumnSet, SecondOrderColumns, Step};
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+use crate::scene::view::{Media, View};
+
+/// Follows sample `sample` of `pixel` (x right, y down) and tells every event with the columns before and after it.
+pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result<Value> {
+    if sample >= plan.samples.total {
+        return Err(Error::usage("--sample", format!("{sample} of {}: the first is 0", plan.samples.total)));
+    }
+    let camera = super::camera(scene, plan)?;
+    let view = View::new(scene, camera.position);
+    let media = Media::at(scene, plan.optics.reference, plan.optics.dispersion_scale)?;
+    let follower = Follower::new(&view);
+    let [dx, dy] = Sampler::new(plan.samples.total, plan.seed)?.position(pixel, sample);
+    let raster = [f64::from(pixel[0]) + dx, f64::from(pixel[1]) + dy];
+    let start = camera.ray(raster[0], raster[1]);
+    let medium = follower.start_medium(&media);
+    let mut log = Vec::new();
+    let chain: Chain<SecondOrderColumns> = follower.follow(&start, &media, Some(&mut log), &mut Counters::default());
+
+    let mut columns = SecondOrderColumns::start(&start, &medium);
+    let mut point = start.point;
+    let mut events = Vec::new();
+    for Step { transfer, scattering } in &log {
+        columns.transfer(transfer);
+        point += transfer.distance * transfer.direction;
+        let Some(scattering) = scattering else { break };
+        let before = columns;
+        columns.scatter(scattering);
+        events.push(json!({
+            "event": format!("{:?}", scattering.kind),
+            "distance": transfer.distance,
+            "position": array(view.origin + point),
+            "normal": array(scattering.normal),
+            "geometric_normal_used": scattering.geometric_normal_used,
+            "ior": [scattering.ior_i.ior, scattering.ior_t.ior],
+            "dior_dlambda": [scattering.ior_i.dior_dlambda, scattering.ior_t.dior_dlambda],
+            "w_squared": scattering.w_squared,
+            "momentum": [array(scattering.momentum_in), array(scattering.momentum_out)],
+            "columns": json!({ "arriving": describe(&before), "leaving": describe(&columns) }),
+        }));
+    }
+    let end = match &chain.end {
+        End::Miss => json!({ "kind": "miss" }),
+        End::Exhausted => json!({ "kind": "too many events" }),
+        End::Surface(met) => json!({
+            "kind": "surface",
+            "prim": scene.prims[scene.objects[met.hit.instance as usize].prim_id as usize - 1],
+            "material": (met.material_id as usize).checked_sub(1).map(|i| &scene.materials[i].path),
+            "primitive": met.hit.primitive,
+            "position": array(view.origin + met.point),
+            "normal_geometric": array(met.surface.n_g),
+        }),
+    };
+    Ok(json!({
+        "pixel": pixel,
+        "sample": sample,
+        "raster": raster,
+        "wavelength_nm": plan.optics.reference.nanometers(),
+        "camera": array(view.origin),
+        "direction": array(start.direction),
+        "start_ior": medium.ior,
+        "events": events,
+        "end": end,
+        "last_direction": array(chain.direction),
+        "interfaces": chain.interfaces,
+        "total_reflections": chain.total_reflections,
+        "is_dispersive": chain.is_dispersive,
+        "nearest_critical_nm": if chain.nearest_critical.is_finite() { json!(chain.nearest_critical) } else { Value::Null },
+        "columns": describe(&chain.columns),
+    }))
+}
+
+fn array(v: DVec3) -> [f64; 3] {
+    v.to_array()
+}
+
+fn describe(columns: &SecondOrderColumns) -> Value {
+    let column = |c: &Column| json!({ "point": array(c.point), "momentum": array(c.momentum) });
+    let [x, y] = columns.screen().expect("these columns are carried").map(column);
+    json!({ "x": x, "y": y, "lambda": columns.lambda().map(column), "lambda2": columns.lambda2().map(column) })
+}

@@ -1,1 +1,0 @@
-//! Where in the pixel samples are taken.

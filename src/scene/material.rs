@@ -1,0 +1,188 @@
+//! What a material says, compiled to what a ray follows.
+//!
+//! The index comes from the first of: our `abbe:…` attributes ([`law`]); the dispersion inputs of the shading network,
+//! each by its own specification ([`dialect`]); a scalar index, constant unless [`ScalarIor`] says otherwise. Fallbacks
+//! of a schema never decide, only authored values do, and what decided stands in [`Material::chosen`].
+
+mod dialect;
+mod law;
+#[cfg(test)]
+mod tests;
+mod values;
+
+use crate::diagnostics::Diagnostics;
+use crate::error::{Error, Result};
+use crate::optics::dispersion::Dispersion;
+use crate::scene::description;
+
+use dialect::{Response, Surface};
+use law::Authored;
+use values::Values;
+
+/// From this weight on a surface counts as what the weight says: transmissive, metallic, present.
+const THRESHOLD: f64 = 0.5;
+
+/// The highest roughness of a smooth surface: its GGX lobe α = roughness² = 0.0009 rad is as narrow as a pixel of a
+/// 960 pixel wide image with a field of 50°, so what is seen in it is seen at full sharpness. A metal above it ends the
+/// specular chain, a dielectric is followed along the mean normal and counts as rough.
+pub const SMOOTH_ROUGHNESS: f64 = 0.03;
+
+/// What becomes of an index that nothing else is known of (`abbe:scalarIor`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ScalarIor {
+    /// It holds at every wavelength; its derivative is exactly 0.
+    #[default]
+    Constant,
+}
+
+impl ScalarIor {
+    /// Reads the token of the stage or of the command line; `place` names where it stands.
+    pub fn parse(text: &str, place: &str) -> Result<Self> {
+        match text {
+            "" | "constant" => Ok(Self::Constant),
+            "nearestGlass" | "nearest-glass" => Err(Error::usage(
+                place,
+                format!("'{text}' needs the glass catalogue, which is not part of this version: use constant"),
+            )),
+            _ => Err(Error::usage(place, format!("'{text}' is unknown: use constant"))),
+        }
+    }
+}
+
+/// A compiled material.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Prim path.
+    pub path: String,
+    /// What a ray does at its surface.
+    pub kind: Kind,
+    /// What decided the kind and the index, and why; one line for the plan.
+    pub chosen: String,
+}
+
+/// What a ray of the specular chain does at a surface.
+#[derive(Clone, Debug)]
+pub enum Kind {
+    /// It is refracted or totally reflected.
+    Dielectric {
+        /// The index inside.
+        dispersion: Dispersion,
+        /// `abbe:dielectricPriority`: 0 is unset and weakest, otherwise the lower number wins where objects overlap.
+        priority: i32,
+        /// Rougher than [`SMOOTH_ROUGHNESS`].
+        rough: bool,
+        /// A wall without an inside: the ray goes straight through.
+        thin_walled: bool,
+    },
+    /// It is reflected: a smooth metal.
+    Mirror,
+    /// It goes straight on, as if the surface were not there.
+    PassThrough,
+    /// It ends.
+    Opaque,
+}
+
+/// Compiles what was authored. Errors name the prim and attribute, and what to author instead.
+pub fn compile(
+    material: &description::Material,
+    scalar_ior: ScalarIor,
+    diagnostics: &mut Diagnostics,
+) -> Result<Material> {
+    let (kind, chosen) = classify(material, scalar_ior, diagnostics)?;
+    Ok(Material { path: material.path.clone(), kind, chosen })
+}
+
+fn classify(
+    material: &description::Material,
+    scalar_ior: ScalarIor,
+    diagnostics: &mut Diagnostics,
+) -> Result<(Kind, String)> {
+    let mut places = vec![Values::new(&material.abbe, &material.path, "")];
+    if let Some(shader) = &material.surface {
+        places.push(Values::new(&shader.abbe, &shader.path, "inputs:"));
+    }
+    places.push(Values::new(&material.interface_abbe, &material.path, "inputs:"));
+    let authored = Authored::new(places);
+
+    let Some(shader) = &material.surface else {
+        warn_of_idle_law(material, &authored, "it has no surface shader", diagnostics)?;
+        return Ok((Kind::Opaque, "opaque: no surface shader".to_owned()));
+    };
+    let Some(surface) = Surface::of(shader) else {
+        diagnostics.warn(
+            "unsupported-shader",
+            format!("<{}>", shader.path),
+            format!("shader '{}' is not understood: its surfaces are opaque", shader.id),
+        );
+        return Ok((Kind::Opaque, format!("opaque: shader '{}' is not understood", shader.id)));
+    };
+    surface.warn_of_unread(diagnostics)?;
+
+    let (kind, reason) = match surface.response(diagnostics)? {
+        Response::Transmissive { why, rough, thin_walled } => {
+            let (dispersion, source) = dispersion(&surface, shader, &authored, scalar_ior, diagnostics)?;
+            let wall = if thin_walled { "thin-walled dielectric, followed straight through" } else { "dielectric" };
+            let lobe = if rough { ", rough" } else { "" };
+            let priority = authored.priority()?;
+            let chosen = format!("{wall} ({why}{lobe}): {source}");
+            return Ok((Kind::Dielectric { dispersion, priority, rough, thin_walled }, chosen));
+        }
+        Response::Metal { why, rough: false } => (Kind::Mirror, format!("mirror: {why}, smooth")),
+        Response::Metal { why, rough: true } => {
+            (Kind::Opaque, format!("opaque: {why}, rougher than {SMOOTH_ROUGHNESS}"))
+        }
+        Response::CutOut(why) => (Kind::PassThrough, format!("cut out: {why}")),
+        Response::Opaque(why) => (Kind::Opaque, format!("opaque: {why}")),
+    };
+    warn_of_idle_law(material, &authored, &reason, diagnostics)?;
+    Ok((kind, reason))
+}
+
+/// The index of a transmissive surface and where it comes from.
+fn dispersion(
+    surface: &Surface<'_>,
+    shader: &description::Shader,
+    authored: &Authored<'_>,
+    scalar_ior: ScalarIor,
+    diagnostics: &mut Diagnostics,
+) -> Result<(Dispersion, String)> {
+    let at = |name: &str| {
+        let place = format!("<{}>.{name}", shader.path);
+        move |problem: String| Error::scene(place, problem)
+    };
+    let glass = surface.glass(diagnostics)?;
+    let (law, source) = if let Some(stated) = authored.law(glass.ior, diagnostics)? {
+        (stated.dispersion, stated.source)
+    } else if let Some(abbe_number) = glass.abbe_number {
+        let law = Dispersion::from_abbe_number(glass.ior, abbe_number).map_err(at("inputs"))?;
+        (law, format!("{} of {}, n_d from {}", glass.abbe_source, shader.id, glass.ior_source))
+    } else {
+        let ScalarIor::Constant = scalar_ior;
+        let law = Dispersion::constant(glass.ior).map_err(at("inputs"))?;
+        (law, format!("no dispersion is authored, {} of {}", glass.ior_source, shader.id))
+    };
+    let scale = authored.scale(diagnostics)?;
+    // 1 leaves the law as it is, bit for bit.
+    if scale.to_bits() == 1.0_f64.to_bits() {
+        return Ok((law.clone(), format!("{} from {source}", law.describe())));
+    }
+    let scaled = law.scaled(scale).map_err(|problem| Error::scene(authored.scale_place(), problem))?;
+    Ok((scaled, format!("{} from {source}, dispersion × {scale}", law.describe())))
+}
+
+/// A law on a surface that lets no light pass is most likely a forgotten transmission.
+fn warn_of_idle_law(
+    material: &description::Material,
+    authored: &Authored<'_>,
+    reason: &str,
+    diagnostics: &mut Diagnostics,
+) -> Result<()> {
+    if authored.has_law()? {
+        diagnostics.warn(
+            "idle-dispersion",
+            format!("<{}>", material.path),
+            format!("has a dispersion law and no glass to use it ({reason}): author a transmissive surface"),
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! The scene as one camera sees it: instances about the camera, media at one wavelength, the media it stands in.
+
+use glam::DVec3;
+
+use super::Scene;
+use super::material::{Kind, Material};
+use crate::error::{Error, Result};
+use crate::geometry::{Aggregate, Departures, Hit, Instance, Ray};
+use crate::optics::IorJet;
+use crate::optics::media::{Inside, MediaStack, MediumId};
+use crate::spectrum::Wavelength;
+
+/// The direction of the one fixed ray that finds the media around the camera: no axis or diagonal that scenes are built on.
+const PARITY_DIRECTION: DVec3 = DVec3::new(0.267_261_241_912_424_4, 0.534_522_483_824_848_8, 0.801_783_725_737_273_2);
+
+/// A scene in render space: the stage's world with the camera at the origin.
+#[derive(Debug)]
+pub struct View<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// What rays meet.
+    pub aggregate: Aggregate,
+    /// World position of the origin.
+    pub origin: DVec3,
+}
+
+impl<'a> View<'a> {
+    /// `scene` about the world point `origin`.
+    pub fn new(scene: &'a Scene, origin: DVec3) -> Self {
+        let instances: Vec<_> = scene
+            .objects
+            .iter()
+            .map(|object| Instance { shape: object.shape.clone(), world_from_object: object.world_from_object })
+            .collect();
+        Self { scene, aggregate: Aggregate::build(&instances, origin), origin }
+    }
+
+    /// `material_id` at `hit`, 0 for none.
+    pub fn material_id(&self, hit: &Hit) -> u32 {
+        let ids = &self.scene.objects[hit.instance as usize].material_ids;
+        ids[self.slot(hit, ids) as usize]
+    }
+
+    fn slot(&self, hit: &Hit, ids: &[u32]) -> u32 {
+        // One material, one slot: no lookup of the face.
+        if ids.len() == 1 { 0 } else { self.aggregate.slot(hit) }
+    }
+
+    /// The material at `hit`.
+    pub fn material(&self, hit: &Hit) -> Option<&'a Material> {
+        (self.material_id(hit) as usize).checked_sub(1).map(|i| &self.scene.materials[i])
+    }
+
+    /// The medium behind the surface at `hit`, if its material `id` (1-based) fills a volume.
+    pub fn inside(&self, hit: &Hit, id: u32) -> Option<Inside> {
+        let index = id.checked_sub(1)?;
+        match self.scene.materials[index as usize].kind {
+            Kind::Dielectric { priority, thin_walled: false, .. } => {
+                Some(Inside { instance: hit.instance, slot: id, medium: MediumId(index), priority })
+            }
+            _ => None,
+        }
+    }
+
+    /// The media around the render-space point `p`: those left more often than entered on the way out to infinity along
+    /// one fixed ray. The nearest exit is the innermost medium.
+    pub fn media_at(&self, p: DVec3) -> MediaStack {
+        let mut stack = MediaStack::new();
+        if !self.scene.materials.iter().any(|m| matches!(m.kind, Kind::Dielectric { thin_walled: false, .. })) {
+            return stack;
+        }
+        let mut crossings = Vec::new();
+        let ray = Ray { origin: p, direction: PARITY_DIRECTION };
+        self.aggregate.crossings(&ray, &mut |hit| {
+            let id = self.material_id(hit);
+            if let Some(inside) = self.inside(hit, id) {
+                crossings.push((hit.distance, hit.leaving, inside));
+            }
+        });
+        crossings.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.instance.cmp(&b.2.instance)).then(a.1.cmp(&b.1)));
+        // Going outwards, an entry must be left again before an exit counts as ours.
+        let mut open: Vec<(u32, u32)> = Vec::new();
+        let mut around = Vec::new();
+        for (_, leaving, inside) in crossings {
+            let key = (inside.instance, inside.slot);
+            if !leaving {
+                open.push(key);
+            } else if let Some(i) = open.iter().rposition(|&k| k == key) {
+                open.remove(i);
+            } else {
+                around.push(inside);
+            }
+        }
+        around.into_iter().rev().for_each(|inside| stack.enter(inside));
+        stack
+    }
+
+    /// The nearest surface.
+    pub fn intersect(&self, ray: &Ray, departures: &Departures) -> Option<Hit> {
+        self.aggregate.intersect(ray, departures)
+    }
+}
+
+/// The indices of all media at one wavelength.
+#[derive(Clone, Debug)]
+pub struct Media {
+    jets: Vec<IorJet>,
+}
+
+impl Media {
+    /// At `wavelength`, with the dispersion of every medium scaled by `scale` (1 physical, 0 none).
+    ///
+    /// Refuses a scale under which a medium has no index.
+    pub fn at(scene: &Scene, wavelength: Wavelength, scale: f64) -> Result<Self> {
+        let jet = |material: &Material| match &material.kind {
+            Kind::Dielectric { dispersion, .. } => {
+                let scaled = dispersion.scaled(scale).map_err(|problem| Error::scene(&material.path, problem))?;
+                Ok(scaled.at(wavelength))
+            }
+            _ => Ok(IorJet::VACUUM),
+        };
+        Ok(Self { jets: scene.materials.iter().map(jet).collect::<Result<_>>()? })
+    }
+
+    /// Of `medium`; 1 outside everything.
+    pub fn of(&self, medium: Option<MediumId>) -> IorJet {
+        medium.map_or(IorJet::VACUUM, |id| self.jets[id.0 as usize])
+    }
+    /// Of the material with the 1-based `material_id`; 1 for none.
+    pub fn of_material(&self, material_id: u32) -> IorJet {
+        self.of(material_id.checked_sub(1).map(MediumId))
+    }
+}
