@@ -207,9 +207,9 @@ class CheckReport:
             for d in self.differences:
                 at = "" if d.worst is None else f"{d.worst[0]},{d.worst[1]}"
                 counted = f"{d.differing} of {d.pixels}"
-                verdict = "ok" if d.passed else "DIFFERS"
+                outcome = "ok" if d.passed else "DIFFERS"
                 rows.append(
-                    (d.layer or "(bare)", _short(d.maximum), _short(d.rms), _short(d.mean), counted, at, verdict)
+                    (d.layer or "(bare)", _short(d.maximum), _short(d.rms), _short(d.mean), counted, at, outcome)
                 )
             yield from _table(rows)
         for failure in self.failures:
@@ -532,14 +532,14 @@ def _compare(image: ExrImage, reference: ExrImage, tolerance: float, relative: f
         report.failures.append(Failure(f"the data window is {shown[0]}, that of {reference.path} is {shown[1]}"))
         return
     ours, theirs = _grouped(image), _grouped(reference)
-    for name in ours.keys() | theirs.keys():
+    for name in sorted(ours.keys() | theirs.keys()):
         missing = [i.path for i, groups in ((image, ours), (reference, theirs)) if name not in groups]
-        shown = f"layer `{name}`" if name else "the bare channels"
+        title = f"layer `{name}`" if name else "the bare channels"
         if missing:
-            report.failures.append(Failure(f"{shown}: not in {missing[0]}"))
+            report.failures.append(Failure(f"{title}: not in {missing[0]}"))
         elif set(ours[name]) != set(theirs[name]):
             lists = [", ".join(sorted(groups[name])) for groups in (ours, theirs)]
-            report.failures.append(Failure(f"{shown}: has {lists[0]}, in {reference.path} it has {lists[1]}"))
+            report.failures.append(Failure(f"{title}: has {lists[0]}, in {reference.path} it has {lists[1]}"))
     for name in sorted(ours.keys() & theirs.keys()):
         suffixes = sorted(ours[name].keys() & theirs[name].keys())
         for suffix in suffixes:

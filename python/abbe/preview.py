@@ -31,11 +31,41 @@ __all__ = ["Tile", "contact_sheet", "tiles_of", "write_preview"]
 _VIRIDIS = np.array(
     [
         [int(entry[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-        for entry in (
-            "440154 470d60 48186a 482374 472d7b 453781 424086 3e4989 3b528b 375b8d 33638d 2f6b8e 2c728e 297a8e 26828e "
-            "23898e 21918c 1f988b 1fa088 22a785 28ae80 32b67a 3fbc73 4ec36b 5ec962 70cf57 84d44b 98d83e addc30 c2df23 "
-            "d8e219 ece51b fde725"
-        ).split()
+        for entry in [
+            "440154",
+            "470d60",
+            "48186a",
+            "482374",
+            "472d7b",
+            "453781",
+            "424086",
+            "3e4989",
+            "3b528b",
+            "375b8d",
+            "33638d",
+            "2f6b8e",
+            "2c728e",
+            "297a8e",
+            "26828e",
+            "23898e",
+            "21918c",
+            "1f988b",
+            "1fa088",
+            "22a785",
+            "28ae80",
+            "32b67a",
+            "3fbc73",
+            "4ec36b",
+            "5ec962",
+            "70cf57",
+            "84d44b",
+            "98d83e",
+            "addc30",
+            "c2df23",
+            "d8e219",
+            "ece51b",
+            "fde725",
+        ]
     ]
 )
 
@@ -534,7 +564,8 @@ def _viridis(t: np.ndarray) -> np.ndarray:
     at = np.clip(t, 0, 1) * (len(_VIRIDIS) - 1)
     low = np.minimum(at.astype(np.intp), len(_VIRIDIS) - 2)
     part = (at - low)[..., np.newaxis]
-    return _VIRIDIS[low] * (1 - part) + _VIRIDIS[low + 1] * part
+    colours: np.ndarray = _VIRIDIS[low] * (1 - part) + _VIRIDIS[low + 1] * part
+    return colours
 
 
 def _hue_and_lightness(angle: np.ndarray, amount: np.ndarray) -> np.ndarray:

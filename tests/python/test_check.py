@@ -4,13 +4,11 @@ import json
 
 import numpy as np
 import pytest
-
-pytest.importorskip("OpenImageIO", reason="the check opens files with OpenImageIO")
-
 import sample_exr
+from abbe.check import check
 from sample_exr import TABLE
 
-from abbe.check import check
+pytest.importorskip("OpenImageIO", reason="the check opens files with OpenImageIO")
 
 
 def run(tmp_path, change=None, *, name="out.exr", **options):

@@ -1,15 +1,14 @@
-"""Previews: every kind of AOV is shown as its legend says, absent values as a checker, and the file is whole or not there."""
+"""Previews: every kind of AOV is shown as its legend says, absent values as a checker, the file whole or not at all."""
 
 import json
 
 import numpy as np
 import pytest
-
-Image = pytest.importorskip("PIL.Image", reason="previews are drawn with Pillow")
-
 from abbe import preview
 from abbe.errors import AbbeError, UsageError
 from abbe.preview import Tile, contact_sheet, write_preview
+
+Image = pytest.importorskip("PIL.Image", reason="previews are drawn with Pillow")
 
 UNITS = [
     {"name": "dispersion", "unit": "pixel/nm"},
@@ -52,9 +51,9 @@ def film():
 def test_a_film_becomes_a_sheet(tmp_path):
     path = tmp_path / "sheet.png"
     write_preview(film(), path, aovs=UNITS)
-    sheet = Image.open(path)
-    assert sheet.mode == "RGB"
-    assert min(sheet.size) > 300
+    with Image.open(path) as sheet:
+        assert sheet.mode == "RGB"
+        assert min(sheet.size) > 300
     assert [entry.name for entry in tmp_path.iterdir()] == ["sheet.png"]
     first = path.read_bytes()
     write_preview(film(), path, aovs=UNITS)
@@ -67,7 +66,7 @@ def test_only_the_layers_asked_for_are_shown(tmp_path):
     assert tiles[1].unit == "pixel/nm"
     assert tiles[0].names == ("/World/Ball", "/World/Floor")
     assert "ball.usda" in title
-    with pytest.raises(UsageError, match="dispersoin.*dispersion"):
+    with pytest.raises(UsageError, match=r"dispersoin.*dispersion"):
         write_preview(film(), tmp_path / "sheet.png", layers=["dispersoin"], aovs=UNITS)
     assert not list(tmp_path.iterdir())
 
@@ -87,7 +86,8 @@ def test_a_file_shows_what_the_film_shows(tmp_path):
     assert by_name["dispersion"].unit == "pixel/nm"
     assert "587.5618 nm" in title
     write_preview(tmp_path / "in.exr", tmp_path / "sheet.png")
-    assert Image.open(tmp_path / "sheet.png").size[0] > 600
+    with Image.open(tmp_path / "sheet.png") as sheet:
+        assert sheet.size[0] > 600
 
 
 def test_directions_are_hues_and_lengths_lightness():
@@ -98,9 +98,8 @@ def test_directions_are_hues_and_lengths_lightness():
     assert rim.max() <= 1
     distances = np.linalg.norm(rim - np.roll(rim, 50, axis=0), axis=-1)
     assert distances.min() > 0.3
-    for amounts in (np.linspace(0, 1, 20),):
-        lightness = preview._hue_and_lightness(np.full(20, 1.0), amounts).sum(axis=-1)
-        assert np.all(np.diff(lightness) > 0)
+    lightness = preview._hue_and_lightness(np.full(20, 1.0), np.linspace(0, 1, 20)).sum(axis=-1)
+    assert np.all(np.diff(lightness) > 0)
     assert np.all(preview._hue_and_lightness(np.zeros(1), np.zeros(1)) == 0)
 
 
