@@ -10,7 +10,7 @@ use abbe::optics::IorJet;
 use glam::DVec3;
 
 /// d' and ∂d'/∂λ after refraction; `None` where ω² ≤ 0, about which the supplement says nothing (finding 5).
-pub fn refract(
+pub(crate) fn refract(
     d: DVec3,
     n: DVec3,
     ior_0: IorJet,
@@ -20,8 +20,7 @@ pub fn refract(
 ) -> Option<(DVec3, DVec3)> {
     let (n, n_lambda) = if d.dot(n) > 0.0 { (-n, -n_lambda) } else { (n, n_lambda) };
     let eta = ior_0.ior / ior_1.ior;
-    let eta_lambda =
-        (ior_0.dior_dlambda * ior_1.ior - ior_0.ior * ior_1.dior_dlambda) / (ior_1.ior * ior_1.ior);
+    let eta_lambda = (ior_0.dior_dlambda * ior_1.ior - ior_0.ior * ior_1.dior_dlambda) / (ior_1.ior * ior_1.ior);
     let theta = d.dot(n);
     let omega_squared = 1.0 - eta * eta + eta * eta * theta * theta;
     if omega_squared <= 0.0 {
