@@ -113,7 +113,7 @@ PRODUCT = """    def RenderProduct "%s" {
 
 @pytest.fixture
 def slab(tmp_path: Path) -> Callable[..., Path]:
-    """Write a stage with a glass prism before a wall, and the products asked for (name to file), into the test's folder."""
+    """Write a stage: a glass prism before a wall, and the products asked for, name to file."""
 
     def write(name: str = "slab.usda", edit: tuple[str, str] | None = None, **products: str) -> Path:
         text = GLASS_SLAB
