@@ -1,0 +1,639 @@
+"""A contact sheet of AOVs as PNG, in colours that can be read without a manual.
+
+Magnitudes are shown in viridis, whose lightness grows evenly with the value; pixel vectors by hue (direction) and
+lightness (magnitude) of OKLCh, in which hues are equally bright; identifiers by distinct colours. Every tile says its
+unit and scale. Scales are robust: a few extreme pixels (caustics, grazing rays) do not darken the rest, and the legend
+says at which percentile colours saturate. Where an AOV has no value a grey checker shows through.
+
+Sources: viridis by S. van der Walt, N. Smith and E. Firing (matplotlib, CC0), 33 of its 256 entries, linear in between;
+OKLab by B. Ottosson, "A perceptual color space for image processing", 2020 (public domain).
+"""
+
+from __future__ import annotations
+
+import colorsys
+import json
+import math
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ._image import channel_name, read_exr
+from .errors import AbbeError, UsageError
+
+__all__ = ["Tile", "contact_sheet", "tiles_of", "write_preview"]
+
+_VIRIDIS = np.array(
+    [
+        [int(entry[i : i + 2], 16) / 255 for i in (0, 2, 4)]
+        for entry in [
+            "440154",
+            "470d60",
+            "48186a",
+            "482374",
+            "472d7b",
+            "453781",
+            "424086",
+            "3e4989",
+            "3b528b",
+            "375b8d",
+            "33638d",
+            "2f6b8e",
+            "2c728e",
+            "297a8e",
+            "26828e",
+            "23898e",
+            "21918c",
+            "1f988b",
+            "1fa088",
+            "22a785",
+            "28ae80",
+            "32b67a",
+            "3fbc73",
+            "4ec36b",
+            "5ec962",
+            "70cf57",
+            "84d44b",
+            "98d83e",
+            "addc30",
+            "c2df23",
+            "d8e219",
+            "ece51b",
+            "fde725",
+        ]
+    ]
+)
+
+# Colours saturate beyond this percentile of the magnitude, or below its complement where a scale does not begin at 0.
+_PERCENTILE = 99.0
+
+# The sheet: colours in sRGB bytes, lengths in pixels.
+_PAPER, _INK, _FAINT = (24, 25, 28), (236, 236, 236), (168, 170, 176)
+_CHECKER = ((74, 74, 78), (92, 92, 96))
+_CHECK = 8
+_MARGIN, _GAP = 24, 22
+_TILE_WIDTH, _TILE_HEIGHT = 400, 300
+_LEGEND_HEIGHT = 74
+_TITLE, _TEXT, _SMALL = 18, 14, 12
+
+# What the font that Pillow brings along cannot show.
+_ASCII = str.maketrans(
+    {"²": "^2", "³": "^3", "×": "x", "∂": "d", "λ": "lambda", "µ": "u", "°": " deg", "…": "...", "–": "-"}
+)
+
+_NORMALS = frozenset({"normal", "normal_geometric", "refracted_normal", "refracted_normal_geometric"})
+_MANIFESTS = {"prim": "abbe:primManifest", "instance": "abbe:instanceManifest", "material": "abbe:materialManifest"}
+
+
+@dataclass
+class Tile:
+    """One AOV to show.
+
+    Attributes
+    ----------
+    name : what the tile is called
+    aov : the AOV, which decides how it is shown
+    values : array of shape (height, width, channels), float or unsigned integer
+    valid : fraction of samples with a value, shape (height, width); None if all have one
+    unit : unit of the values
+    names : what identifiers mean: entry n - 1 for the number n
+    """
+
+    name: str
+    aov: str
+    values: np.ndarray
+    valid: np.ndarray | None = None
+    unit: str = ""
+    names: Sequence[str] = field(default_factory=tuple)
+
+
+@dataclass
+class _Canvas:
+    """The sheet, and Pillow's pen for it."""
+
+    sheet: Any
+    draw: Any
+
+
+@dataclass
+class _Picture:
+    """A tile in colours, and what its legend says."""
+
+    colours: np.ndarray
+    """sRGB in 0..1, shape (height, width, 3)."""
+    legend: Callable[[_Canvas, tuple[int, int, int, int]], None]
+    """Draws the legend into a box."""
+    blends: bool = True
+    """Whether neighbouring pixels may be averaged when the picture is made smaller."""
+
+
+def write_preview(
+    source: Any,
+    path: str | os.PathLike[str],
+    *,
+    layers: Iterable[str] | None = None,
+    aovs: Iterable[Mapping[str, Any]] | None = None,
+) -> None:
+    """Write a contact sheet of a film or of an EXR file.
+
+    Parameters
+    ----------
+    source : a film (a mapping from AOV to arrays of shape (height, width, channels), with ``film.valid(name)``), a plain
+        mapping of such arrays, or the path of an EXR that abbe wrote
+    path : the PNG file; it is replaced as a whole
+    layers : which layers or AOVs to show, in this order; all if None
+    aovs : the AOV table, which has the units; the renderer's own if None
+
+    Raises
+    ------
+    FileNotFoundError
+        The EXR does not exist, or the directory of ``path`` does not.
+    UsageError
+        A layer is not there.
+    AbbeError
+        The EXR cannot be read, or Pillow is not installed.
+    """
+    path = Path(path)
+    tiles, title = tiles_of(source, layers=layers, aovs=aovs)
+    sheet = contact_sheet(tiles, title=title)
+    if not path.parent.is_dir():
+        raise FileNotFoundError(
+            f"{path}: the directory {path.parent} does not exist: create it, or choose another place"
+        )
+    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as out:
+            sheet.save(out, format="PNG")
+        # mkstemp makes private files; an image has the rights that the user's umask gives.
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(temporary, 0o666 & ~mask)
+        os.replace(temporary, path)
+    except BaseException:
+        os.unlink(temporary)
+        raise
+
+
+def tiles_of(
+    source: Any, *, layers: Iterable[str] | None = None, aovs: Iterable[Mapping[str, Any]] | None = None
+) -> tuple[list[Tile], str]:
+    """Return the tiles of a film or EXR file, and a title; see :func:`write_preview`."""
+    if isinstance(source, (str, os.PathLike)):
+        tiles, title = _tiles_of_file(source)
+    else:
+        tiles, title = _tiles_of_film(source, aovs)
+    if layers is not None:
+        chosen = []
+        for wanted in layers:
+            found = next((tile for tile in tiles if wanted in (tile.name, tile.aov)), None)
+            if found is None:
+                known = ", ".join(tile.name for tile in tiles)
+                raise UsageError(f"preview: no layer `{wanted}`: choose among {known}")
+            chosen.append(found)
+        tiles = chosen
+    if not tiles:
+        raise UsageError("preview: there is no layer to show: ask for at least one AOV")
+    return tiles, title
+
+
+def _tiles_of_file(path: str | os.PathLike[str]) -> tuple[list[Tile], str]:
+    image = read_exr(path)
+    try:
+        layers = image.layers()
+    except ValueError as error:
+        raise AbbeError(f"{path}: not written by abbe ({error}): name a file that abbe wrote") from None
+    tiles = []
+    for name, aov in layers:
+        prefix = channel_name(name, "")
+        # OpenImageIO sorts channels as it likes: components come in the order of the alphabet, as in all our AOVs.
+        suffixes = sorted(
+            channel[len(prefix) :]
+            for channel in image.channels
+            if channel.startswith(prefix) and "." not in channel[len(prefix) :] and channel[len(prefix) :] != "valid"
+        )
+        if name == "":
+            suffixes = [suffix for suffix in suffixes if suffix != "Z"] or suffixes
+        if not suffixes:
+            raise AbbeError(f"{path}: layer `{name}` has no channels: render the file again")
+        tiles.append(
+            Tile(
+                name=name or aov,
+                aov=aov,
+                values=np.stack([image.channels[channel_name(name, suffix)] for suffix in suffixes], axis=-1),
+                valid=image.channel(name, "valid"),
+                unit=image.text(f"abbe:unit:{name or aov}") or "",
+                names=_manifest(aov, image.attributes),
+            )
+        )
+    x, y, width, height = image.raster
+    parts = [Path(path).name, f"{width} x {height}"]
+    if (*image.origin, *image.size) != (x, y, width, height):
+        parts.append(f"window {image.origin[0]},{image.origin[1]} {image.size[0]} x {image.size[1]}")
+    return tiles, "   ".join([*parts, *_facts(image.attributes)])
+
+
+def _tiles_of_film(film: Any, aovs: Iterable[Mapping[str, Any]] | None) -> tuple[list[Tile], str]:
+    if aovs is None:
+        try:
+            from abbe import _core
+
+            aovs = _core.aovs()
+        except ImportError:
+            aovs = ()
+    units = {str(row["name"]): str(row["unit"]) for row in aovs}
+    metadata = getattr(film, "metadata", None) or {}
+    valid = getattr(film, "valid", lambda name: None)
+    tiles = []
+    for name in film.keys():  # noqa: SIM118 (a film is not a dict)
+        values = np.asarray(film[name])
+        if values.ndim == 2:
+            values = values[:, :, np.newaxis]
+        tiles.append(Tile(name, name, values, valid(name), units.get(name, ""), _manifest(name, metadata)))
+    size = f"{tiles[0].values.shape[1]} x {tiles[0].values.shape[0]}" if tiles else ""
+    stage = metadata.get("abbe:stage")
+    return tiles, "   ".join([*([Path(str(stage)).name] if stage else []), size, *_facts(metadata)])
+
+
+def _facts(attributes: Mapping[str, Any]) -> list[str]:
+    """What the title says of the render, as far as the header has it."""
+    facts = []
+    wavelength = attributes.get("abbe:referenceWavelength")
+    if isinstance(wavelength, (int, float)):
+        facts.append(f"reference {wavelength:.7g} nm")
+    if isinstance(band := attributes.get("abbe:band"), str):
+        facts.append(f"band {band}")
+    return facts
+
+
+def _manifest(aov: str, attributes: Mapping[str, Any]) -> tuple[str, ...]:
+    attribute = _MANIFESTS.get(aov.removeprefix("refracted_").removesuffix("_id"))
+    text = attributes.get(attribute) if attribute else None
+    try:
+        entries = json.loads(text) if isinstance(text, str) else []
+    except json.JSONDecodeError:
+        entries = []
+    return tuple(str(entry) for entry in entries) if isinstance(entries, list) else ()
+
+
+def contact_sheet(tiles: Sequence[Tile], *, title: str = "") -> Any:
+    """Draw the tiles in a grid.
+
+    Parameters
+    ----------
+    tiles : what to show
+    title : a line above them
+
+    Returns
+    -------
+    PIL.Image.Image
+        The sheet, RGB.
+    """
+    try:
+        from PIL import Image, ImageDraw
+    except ImportError:
+        raise AbbeError("preview: Pillow cannot be imported: pip install 'abbe[preview]'") from None
+    height, width = tiles[0].values.shape[:2]
+    shown = _shown_size(width, height)
+    # Wide tiles for wide images, but never narrower than a legend.
+    cell_width = max(shown[0], 330)
+    cell_height = _TEXT + 12 + shown[1] + 8 + _LEGEND_HEIGHT
+    columns = _columns(len(tiles), cell_width + _GAP, cell_height + _GAP)
+    rows = math.ceil(len(tiles) / columns)
+    top = _MARGIN + (_TITLE + 18 if title else 0)
+    size = (
+        2 * _MARGIN + columns * cell_width + (columns - 1) * _GAP,
+        top + rows * (cell_height + _GAP) - _GAP + _MARGIN,
+    )
+    sheet = Image.new("RGB", size, _PAPER)
+    canvas = _Canvas(sheet, ImageDraw.Draw(sheet))
+    if title:
+        used = _write(canvas, (_MARGIN, _MARGIN - 4), title, _TITLE, _INK, size[0] - 2 * _MARGIN)
+        if any(_weight(tile) is not None for tile in tiles):
+            at = (_MARGIN + used + 24, _MARGIN)
+            _write(canvas, at, "grey checker: no value", _SMALL, _FAINT, size[0] - _MARGIN - at[0])
+    for index, tile in enumerate(tiles):
+        x = _MARGIN + index % columns * (cell_width + _GAP)
+        y = top + index // columns * (cell_height + _GAP)
+        picture = _picture(tile)
+        label = tile.name if tile.name == tile.aov else f"{tile.name} ({tile.aov})"
+        used = _write(canvas, (x, y), label, _TEXT + 2, _INK, cell_width)
+        if tile.unit and tile.unit != "1":
+            _write(canvas, (x + used + 10, y + 3), f"[{tile.unit}]", _SMALL, _FAINT, cell_width - used - 10)
+        y += _TEXT + 12
+        sheet.paste(_scaled(Image, picture, _weight(tile), shown), (x, y))
+        canvas.draw.rectangle((x - 1, y - 1, x + shown[0], y + shown[1]), outline=(60, 62, 68))
+        y += shown[1] + 8
+        picture.legend(canvas, (x, y, x + cell_width, y + _LEGEND_HEIGHT))
+    return sheet
+
+
+def _columns(count: int, width: int, height: int) -> int:
+    """Columns that bring the sheet closest to 16:10."""
+    return min(
+        range(1, count + 1), key=lambda n: abs(math.log(n * width / (math.ceil(count / n) * height) / 1.6)), default=1
+    )
+
+
+def _shown_size(width: int, height: int) -> tuple[int, int]:
+    """The size at which an image of this size fits a tile: whole multiples where it is enlarged."""
+    scale = min(_TILE_WIDTH / width, _TILE_HEIGHT / height)
+    if scale >= 1:
+        scale = math.floor(scale)
+    return max(1, round(width * scale)), max(1, round(height * scale))
+
+
+def _weight(tile: Tile) -> np.ndarray | None:
+    """How much of each pixel has a value that can be shown; None if all of all."""
+    weight = np.ones(tile.values.shape[:2], np.float32) if tile.valid is None else tile.valid
+    if tile.values.dtype.kind == "f":
+        weight = np.where(np.all(np.isfinite(tile.values), axis=-1), weight, 0)
+    weight = np.clip(np.nan_to_num(weight), 0, 1).astype(np.float32)
+    return None if np.all(weight == 1) else weight
+
+
+def _scaled(image_module: Any, picture: _Picture, weight: np.ndarray | None, size: tuple[int, int]) -> Any:
+    """The picture at its size on the sheet, over the checker where there is no value."""
+    height, width = picture.colours.shape[:2]
+    colours = np.round(255 * np.clip(picture.colours, 0, 1)).astype(np.uint8)
+    image = image_module.fromarray(colours)
+    resampling = image_module.Resampling
+    method = resampling.BOX if picture.blends and size[0] < width else resampling.NEAREST
+    if weight is None:
+        return image.resize(size, method)
+    # Colours weighted by validity, so that absent pixels lend no colour to their neighbours.
+    weights = image_module.fromarray(weight)
+    alpha = np.asarray(weights.resize(size, method))[:, :, np.newaxis]
+    planes = [np.asarray(image_module.fromarray(colours[:, :, i] * weight).resize(size, method)) for i in range(3)]
+    row, column = np.indices(size[::-1]) // _CHECK
+    dark, light = (np.array(grey, np.float32) for grey in _CHECKER)
+    checker = np.where(((row + column) % 2)[:, :, np.newaxis], light, dark)
+    return image_module.fromarray(np.round(np.stack(planes, axis=-1) + checker * (1 - alpha)).astype(np.uint8))
+
+
+def _picture(tile: Tile) -> _Picture:
+    """Choose how to show a tile."""
+    values, channels = tile.values, tile.values.shape[2]
+    weight = _weight(tile)
+    some = np.ones(values.shape[:2], bool) if weight is None else weight > 0
+    if not some.any():
+        return _Picture(np.zeros((*values.shape[:2], 3)), _note("no pixel has a value"))
+    if values.dtype.kind == "u":
+        return _counts(values[:, :, 0]) if tile.unit == "count" else _identifiers(tile)
+    # What is not a number is drawn as absent; `abbe check` finds it.
+    values = np.where(some[:, :, np.newaxis], values, 0).astype(np.float64)
+    if tile.aov in _NORMALS:
+        return _Picture(0.5 + 0.5 * values, _note("red, green, blue = 0.5 + 0.5 * (x, y, z)"))
+    if tile.aov.endswith("uv") and channels == 2:
+        blue = np.zeros_like(values[:, :, :1])
+        return _Picture(np.concatenate([np.mod(values, 1.0), blue], axis=-1), _note("red, green = fractions of u, v"))
+    if tile.aov.endswith("position"):
+        return _coordinates(values, some)
+    if channels == 2:
+        return _vectors(values, some, tile.unit)
+    if channels > 1:
+        return _magnitude(np.linalg.norm(values, axis=-1), some, "length of the vector")
+    if tile.aov.endswith("depth"):
+        return _depth(values[:, :, 0], some)
+    if tile.aov in ("dispersion_footprint", "footprint_half_width"):
+        return _magnitude(values[:, :, 0], some, "")
+    return _scalar(values[:, :, 0], some)
+
+
+def _magnitude(values: np.ndarray, some: np.ndarray, what: str) -> _Picture:
+    """Values that begin at 0."""
+    inside = values[some]
+    high = _robust(inside)
+    if high == 0:
+        return _Picture(_viridis(np.zeros_like(values)), _note("0 wherever there is a value"))
+    note = _saturation(high, float(inside.max()))
+    return _Picture(_viridis(values / high), _bar(_viridis, 0.0, high, f"{what}; {note}" if what else note))
+
+
+def _scalar(values: np.ndarray, some: np.ndarray) -> _Picture:
+    """Values of either sign, between their own percentiles."""
+    inside = values[some]
+    low, high = _spread(inside)
+    if low == high:
+        return _Picture(_viridis(np.full_like(values, 0.5)), _note(f"{low:.7g} wherever there is a value"))
+    note = f"all values, {inside.min():.7g} to {inside.max():.7g}"
+    if low > inside.min() or high < inside.max():
+        note = f"percentiles {100 - _PERCENTILE:g} to {_PERCENTILE:g}; values reach {inside.min():.4g} and {inside.max():.4g}"
+    return _Picture(_viridis((values - low) / (high - low)), _bar(_viridis, low, high, note))
+
+
+def _depth(values: np.ndarray, some: np.ndarray) -> _Picture:
+    """Near is bright."""
+    inside = values[some]
+    low, high = _spread(inside)
+    if low == high:
+        return _Picture(np.full((*values.shape, 3), 0.5), _note(f"{low:.7g} wherever there is a value"))
+
+    def ramp(t: np.ndarray) -> np.ndarray:
+        grey = 0.95 - 0.85 * np.clip(t, 0, 1)
+        return np.repeat(grey[..., np.newaxis], 3, axis=-1)
+
+    note = f"near is bright; values reach {inside.min():.5g} and {inside.max():.5g}"
+    return _Picture(ramp((values - low) / (high - low)), _bar(ramp, low, high, note))
+
+
+def _coordinates(values: np.ndarray, some: np.ndarray) -> _Picture:
+    """Points, each axis over its own range."""
+    spans = [_spread(values[:, :, i][some]) for i in range(3)]
+    colours = np.stack([(values[:, :, i] - a) / (b - a or 1) for i, (a, b) in enumerate(spans)], axis=-1)
+    lines = [
+        f"{colour} = {axis}, {a:.4g} to {b:.4g}" for colour, axis, (a, b) in zip(("red", "green", "blue"), "xyz", spans)
+    ]
+    return _Picture(colours, _note(*lines))
+
+
+def _vectors(values: np.ndarray, some: np.ndarray, unit: str) -> _Picture:
+    """Vectors on screen: hue is the direction, lightness the length."""
+    length = np.linalg.norm(values, axis=-1)
+    scale = _robust(length[some])
+    most = float(length[some].max())
+    if scale == 0:
+        return _Picture(_hue_and_lightness(0 * length, length), _note("0 wherever there is a value"))
+    # The root shows directions of small motions too; the wheel of the legend has the same scale.
+    colours = _hue_and_lightness(np.arctan2(values[:, :, 1], values[:, :, 0]), np.sqrt(length / scale))
+
+    def legend(canvas: _Canvas, box: tuple[int, int, int, int]) -> None:
+        from PIL import Image
+
+        # Drawn at four times its size: Pillow does not smooth edges.
+        radius = (_LEGEND_HEIGHT - 16) // 2
+        at = (np.arange(8 * radius) + 0.5) / (4 * radius) - 1
+        x, y = np.meshgrid(at, -at)
+        distance = np.hypot(x, y)
+        wheel = _hue_and_lightness(np.arctan2(y, x), np.sqrt(distance))
+        wheel = np.where((distance <= 1)[:, :, np.newaxis], wheel, np.array(_PAPER) / 255)
+        disc = Image.fromarray(np.round(255 * wheel).astype(np.uint8))
+        left, top = box[0], box[1] + 14
+        canvas.sheet.paste(disc.resize((2 * radius, 2 * radius), Image.Resampling.BOX), (left, top))
+        _write(canvas, (left + radius, top - 2), "+y", _SMALL, _FAINT, anchor="mb")
+        _write(canvas, (left + 2 * radius + 4, top + radius), "+x", _SMALL, _FAINT, anchor="lm")
+        text, room = left + 2 * radius + 34, box[2] - left - 2 * radius - 34
+        _write(canvas, (text, box[1]), f"rim: {scale:.4g} {unit}", _TEXT, _INK, room)
+        _write(canvas, (text, box[1] + 20), "hue: direction; lightness: root of the length", _SMALL, _FAINT, room)
+        _write(canvas, (text, box[1] + 37), "black: 0", _SMALL, _FAINT, room)
+        _write(canvas, (text, box[1] + 54), _saturation(scale, most), _SMALL, _FAINT, room)
+
+    return _Picture(colours, legend)
+
+
+def _identifiers(tile: Tile) -> _Picture:
+    """Distinct colours by number, named by the manifest."""
+    numbers = tile.values[:, :, 0]
+    found, where, counts = np.unique(numbers, return_inverse=True, return_counts=True)
+    palette = np.array([_identifier_colour(int(number)) for number in found])
+    order = [int(i) for i in np.argsort(-counts, kind="stable") if found[i] != 0]
+    absent = bool((found == 0).any())
+
+    def legend(canvas: _Canvas, box: tuple[int, int, int, int]) -> None:
+        shown = order[:6]
+        width = (box[2] - box[0]) // 2
+        for slot, i in enumerate(shown):
+            x, y = box[0] + slot % 2 * width, box[1] + slot // 2 * 18
+            canvas.draw.rectangle((x, y + 2, x + 11, y + 13), fill=tuple(round(255 * c) for c in palette[i]))
+            number = int(found[i])
+            path = tile.names[number - 1] if number <= len(tile.names) else ""
+            _write(canvas, (x + 17, y), f"{number} {path.rpartition('/')[2]}", _SMALL, _FAINT, width - 24)
+        more = len(order) - len(shown)
+        notes = [f"and {more} more"] * (more > 0) + ["black: 0, nothing"] * absent
+        _write(canvas, (box[0], box[1] + (len(shown) + 1) // 2 * 18), ", ".join(notes), _SMALL, _FAINT, box[2] - box[0])
+
+    return _Picture(palette[where.reshape(numbers.shape)], legend, blends=False)
+
+
+def _identifier_colour(number: int) -> tuple[float, float, float]:
+    """A colour of its own for every number: hues a golden angle apart differ even between neighbours."""
+    if number == 0:
+        return (0.0, 0.0, 0.0)
+    hue = (number * 0.618033988749895) % 1.0
+    ring = number // 8 % 3
+    return colorsys.hls_to_rgb(hue, (0.55, 0.7, 0.4)[ring], (0.65, 0.5, 0.8)[ring])
+
+
+def _counts(values: np.ndarray) -> _Picture:
+    """Small whole numbers, one step of viridis each; 0 is black."""
+    most = max(int(values.max()), 1)
+    steps = min(most, 64)
+    palette = np.vstack([np.zeros((1, 3)), _viridis(np.linspace(0.15, 1.0, steps))])
+    found = [int(number) for number in np.unique(np.minimum(values, steps))]
+
+    def legend(canvas: _Canvas, box: tuple[int, int, int, int]) -> None:
+        x, y = box[0], box[1]
+        for number in found:
+            label = f"{number}+" if number == steps < most else str(number)
+            if x + 52 > box[2]:
+                x, y = box[0], y + 20
+            if y + 20 > box[3]:
+                break
+            canvas.draw.rectangle(
+                (x, y + 1, x + 15, y + 14), fill=tuple(round(255 * c) for c in palette[number]), outline=_FAINT
+            )
+            _write(canvas, (x + 21, y), label, _SMALL, _FAINT)
+            x += 52
+
+    return _Picture(palette[np.minimum(values, steps)], legend, blends=False)
+
+
+def _robust(magnitudes: np.ndarray) -> float:
+    """The percentile, of those that are not 0, at which colours saturate: empty surroundings do not set the scale."""
+    nonzero = magnitudes[magnitudes > 0]
+    return float(np.percentile(nonzero, _PERCENTILE)) if nonzero.size else 0.0
+
+
+def _spread(values: np.ndarray) -> tuple[float, float]:
+    low, high = (float(v) for v in np.percentile(values, (100 - _PERCENTILE, _PERCENTILE)))
+    return (low, high) if low < high else (float(values.min()), float(values.max()))
+
+
+def _saturation(scale: float, most: float) -> str:
+    if most <= scale:
+        return f"greatest value {most:.4g}"
+    return f"saturates at percentile {_PERCENTILE:g}; greatest value {most:.4g}"
+
+
+def _viridis(t: np.ndarray) -> np.ndarray:
+    """The colour map at 0..1, clamped; shape (..., 3)."""
+    at = np.clip(t, 0, 1) * (len(_VIRIDIS) - 1)
+    low = np.minimum(at.astype(np.intp), len(_VIRIDIS) - 2)
+    part = (at - low)[..., np.newaxis]
+    colours: np.ndarray = _VIRIDIS[low] * (1 - part) + _VIRIDIS[low + 1] * part
+    return colours
+
+
+def _hue_and_lightness(angle: np.ndarray, amount: np.ndarray) -> np.ndarray:
+    """OKLCh by direction and magnitude 0..1 (clamped) as sRGB; the greatest chroma that sRGB has for every hue."""
+    amount = np.clip(amount, 0, 1)
+    lightness = 0.75 * amount
+    chroma = 0.127 * amount
+    # Hue 0.5 rad, a red, points along +x.
+    a, b = chroma * np.cos(angle + 0.5), chroma * np.sin(angle + 0.5)
+    cone = np.stack(
+        [
+            lightness + 0.3963377774 * a + 0.2158037573 * b,
+            lightness - 0.1055613458 * a - 0.0638541728 * b,
+            lightness - 0.0894841775 * a - 1.2914855480 * b,
+        ],
+        axis=-1,
+    )
+    from_cone = np.array(
+        [
+            [4.0767416621, -3.3077115913, 0.2309699292],
+            [-1.2684380046, 2.6097574011, -0.3413193965],
+            [-0.0041960863, -0.7034186147, 1.7076147010],
+        ]
+    )
+    linear = np.clip(cone**3 @ from_cone.T, 0, 1)
+    coded: np.ndarray = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return coded
+
+
+def _bar(ramp: Callable[[np.ndarray], np.ndarray], low: float, high: float, note: str) -> Callable[..., None]:
+    def legend(canvas: _Canvas, box: tuple[int, int, int, int]) -> None:
+        left, right, top = box[0], box[2] - 1, box[1] + 2
+        colours = ramp((np.arange(left, right + 1) - left) / (right - left))
+        for x, colour in zip(range(left, right + 1), colours, strict=True):
+            canvas.draw.line((x, top, x, top + 13), fill=tuple(int(round(255 * c)) for c in colour))
+        middle = 0.5 * (low + high)
+        for value, anchor, x in ((low, "la", left), (middle, "ma", (left + right) // 2), (high, "ra", right)):
+            _write(canvas, (x, top + 19), f"{value:.4g}", _TEXT, _INK, anchor=anchor)
+        _write(canvas, (left, top + 41), note, _SMALL, _FAINT, right - left)
+
+    return legend
+
+
+def _note(*lines: str) -> Callable[..., None]:
+    def legend(canvas: _Canvas, box: tuple[int, int, int, int]) -> None:
+        for i, line in enumerate(lines):
+            _write(canvas, (box[0], box[1] + 2 + 18 * i), line, _SMALL, _FAINT, box[2] - box[0])
+
+    return legend
+
+
+def _write(
+    canvas: _Canvas,
+    at: tuple[int, int],
+    text: str,
+    size: int,
+    colour: tuple[int, int, int],
+    room: int | None = None,
+    anchor: str = "la",
+) -> int:
+    """Write a line, shortened to ``room`` pixels; returns its width."""
+    from PIL import ImageFont
+
+    font = ImageFont.load_default(size)
+    text = text.translate(_ASCII).encode("ascii", "replace").decode()
+    if room is not None and font.getlength(text) > room:
+        while text and font.getlength(text + "...") > room:
+            text = text[:-1]
+        text += "..."
+    canvas.draw.text(at, text, font=font, fill=colour, anchor=anchor)
+    return math.ceil(font.getlength(text))
