@@ -49,9 +49,9 @@ def _usd_finding() -> Finding:
         return Finding("USD", "broken", f"pxr is there but cannot be imported: {error}")
     except ImportError as error:
         return Finding("USD", "broken", f"pxr is there but cannot be imported: {error}")
-    version = ".".join(str(part) for part in usd.GetVersion())
+    _, year, month = usd.GetVersion()
     resolver = type(ar.GetUnderlyingResolver()).__name__
-    return Finding("USD", "ok", f"{version}, resolver {resolver}, {Path(str(usd.__file__)).parent}")
+    return Finding("USD", "ok", f"{year}.{month:02}, resolver {resolver}, {Path(str(usd.__file__)).parent}")
 
 
 def _schema_finding() -> Finding:

@@ -50,7 +50,7 @@ impl From<Failure> for PyErr {
         let error = match failure {
             Failure::Core(error) => error,
             Failure::Defect(text) => {
-                return AbbeError::new_err(format!("abbe: a defect in the renderer, please report it: {text}"));
+                return AbbeError::new_err(format!("a defect in the renderer, please report it: {text}"));
             }
             Failure::Python(error) => return error,
         };

@@ -15,7 +15,11 @@ def add(commands: Any) -> None:
     parser.add_argument("file", metavar="FILE.exr")
     parser.add_argument("--against", metavar="REF.exr", help="also compare each layer with this file's")
     parser.add_argument(
-        "--tolerance", type=float, default=0.0, metavar="X", help="greatest absolute difference; the same bits unless given"
+        "--tolerance",
+        type=float,
+        default=0.0,
+        metavar="X",
+        help="greatest absolute difference; the same bits unless given",
     )
     parser.add_argument(
         "--relative-tolerance", type=float, default=0.0, metavar="X", help="added to it, times the reference's value"

@@ -17,8 +17,8 @@ __all__ = ["MOST_FRAMES", "has_placeholder", "name_for", "parse"]
 
 # More frames than any film has; a limit on what a typing error can ask for.
 MOST_FRAMES = 1_000_000
-# Decimal fractions are off by about 1e-16 of themselves, and so are their multiples; with a million frames this is still
-# far above that, and far below any stride.
+# Decimal fractions are off by about 1e-16 of themselves, and so are their multiples: this is far above that even with a
+# million frames, and far below any stride.
 _ROUNDING = 1e-9
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"

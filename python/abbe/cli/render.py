@@ -184,4 +184,4 @@ def _render_frame(args: argparse.Namespace, time: Time, outcome: _Outcome) -> No
             from ..preview import write_preview
 
             preview = frames.name_for(args.preview, scene.document["stage"].get("time_code"), "--preview")
-            write_preview(output, preview)
+            write_preview(film, preview)
