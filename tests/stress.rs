@@ -456,6 +456,9 @@ fn w_squared_error(chain: &Chain) -> f64 {
         if s.kind == ScatterKind::Mirror {
             continue;
         }
+        if !s.w_squared.is_finite() {
+            return f64::INFINITY;
+        }
         let [n0, n1, g] = [s.ior_i.ior, s.ior_t.ior, s.g].map(Real::new);
         let exact = &n1 * &n1 - &n0 * &n0 + &g * &g;
         let error = (Real::new(s.w_squared) - &exact).abs();
@@ -474,8 +477,7 @@ impl Outcome {
             Verdict::Undecidable => {}
             Verdict::Wrong(why) => problems.push(why.clone()),
         }
-        // Negated, so that NaN is a problem too.
-        if !(self.w_squared_error <= W_SQUARED_BOUND) {
+        if self.w_squared_error > W_SQUARED_BOUND {
             problems.push(format!("W²: relative error {:.1e} > {W_SQUARED_BOUND:.1e}", self.w_squared_error));
         }
         problems
