@@ -1,8 +1,8 @@
 //! Every derivative of the calculus against re-traces: with 102 digits, and the product's own in f64.
 //!
-//! Tolerances: first derivatives 10⁻¹² and second ones 10⁻⁹ of the vector's norm times the chain's condition number,
-//! which `oracle` defines and measures (the reaction of the exact result to relative perturbations of every input and
-//! intermediate).
+//! Tolerance: 10⁻¹² of the vector's norm times the chain's condition number, for first and second derivatives. `oracle`
+//! defines and measures that number: the reaction of the exact result to relative perturbations of every input and
+//! intermediate.
 
 mod oracle;
 #[path = "support/supplement.rs"]
