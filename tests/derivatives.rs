@@ -1,10 +1,12 @@
 //! Every derivative of the calculus against re-traces: with 102 digits, and the product's own in f64.
 //!
-//! Tolerances: first derivatives 10⁻¹² and second ones 10⁻⁹ of the vector's norm times the chain's condition number,
-//! which `oracle` defines and measures (the reaction of the exact result to relative perturbations of every input and
-//! intermediate).
+//! Tolerance: 10⁻¹² of the vector's norm times the chain's condition number, for first and second derivatives. `oracle`
+//! defines and measures that number: the reaction of the exact result to relative perturbations of every input and
+//! intermediate.
 
 mod oracle;
+#[path = "support/supplement.rs"]
+mod supplement;
 
 use abbe::ray::{
     Column, ColumnSet, LambdaColumn, NoColumns, ScreenColumns, SecondOrderColumns, direction_derivative,
@@ -116,6 +118,9 @@ fn column_sets_carry_the_same_bits() {
     }
 }
 
+/// A derivative: its name, the product's value, the largest step and the difference quotient of a step.
+type Quantity<'a> = (&'static str, DVec3, f64, Box<dyn Fn(f64) -> DVec3 + 'a>);
+
 /// Central differences of the product's own re-trace approach its columns with the square of the step.
 #[test]
 fn central_differences_approach_the_columns_quadratically() {
@@ -126,7 +131,7 @@ fn central_differences_approach_the_columns_quadratically() {
         let lambda2 = here.columns.lambda2().expect("carried");
         let [x, y] = here.columns.screen().expect("carried");
         let point = |x, y, l: f64| subject.at::<NoColumns>(x, y, chain.nanometers + l).expect("a near ray").point;
-        let quantities: [(&str, DVec3, f64, Box<dyn Fn(f64) -> DVec3>); 4] = [
+        let quantities: [Quantity<'_>; 4] = [
             ("p_x", x.point, 8.0, Box::new(|h| (point(h, 0.0, 0.0) - point(-h, 0.0, 0.0)) / (2.0 * h))),
             ("p_y", y.point, 8.0, Box::new(|h| (point(0.0, h, 0.0) - point(0.0, -h, 0.0)) / (2.0 * h))),
             ("p_λ", lambda.point, 8.0, Box::new(|h| (point(0.0, 0.0, h) - point(0.0, 0.0, -h)) / (2.0 * h))),
@@ -269,26 +274,13 @@ fn product_screen_motion(chain: &Chain, infinite: bool) -> (DVec2, DVec2) {
     (first, screen_motion(v_x, v_y, v_ss, normal).expect("no caustic"))
 }
 
-/// The final formula of the derivation supplement (Elek et al. 2014) for ∂d'/∂λ, with d·n < 0.
-fn supplement(d: DVec3, n: DVec3, d_l: DVec3, n_l: DVec3, n0: [f64; 2], n1: [f64; 2]) -> DVec3 {
-    let eta = n0[0] / n1[0];
-    let eta_l = (n0[1] * n1[0] - n0[0] * n1[1]) / (n1[0] * n1[0]);
-    let theta = d.dot(n);
-    let theta_l = d_l.dot(n) + d.dot(n_l);
-    let omega = (1.0 - eta * eta + eta * eta * theta * theta).sqrt();
-    let mu = eta * theta + omega;
-    let omega_l = (-eta * eta_l + eta * eta_l * theta * theta + eta * eta * theta * theta_l) / omega;
-    let mu_l = eta_l * theta + eta * theta_l + omega_l;
-    eta_l * d + eta * d_l - mu_l * n - mu * n_l
-}
-
 #[test]
 fn supplement_formula_gives_the_same_numbers() {
     let mut random = Random::new(2014);
     let mut compared = 0;
     while compared < 200 {
         // A ball met away from grazing; the second event sees ∂d ≠ 0 and ∂n ≠ 0.
-        let (sin, angle) = (random.range(0.05, 0.9), random.range(0.0, 6.28));
+        let (sin, angle) = (random.range(0.05, 0.9), random.range(0.0, std::f64::consts::TAU));
         let ball = Surface::Sphere { center: DVec3::ZERO, radius: 1.0, inward: false };
         let origin = DVec3::new(sin * angle.cos(), sin * angle.sin(), -4.0);
         let event = |root, beyond| Event { surface: ball.clone(), root, action: Action::Interface(beyond) };
@@ -315,11 +307,11 @@ fn supplement_formula_gives_the_same_numbers() {
             // On the unit ball ∂n = ± ∂q.
             let sign = if index == 0 { 1.0 } else { -1.0 };
             let n_l = sign * before.point;
-            let [n0, n1] = [&s.ior_i, &s.ior_t].map(|jet| [jet.ior, jet.dior_dlambda]);
-            let theirs = supplement(d, s.normal, d_l, n_l, n0, n1);
+            let (d_theirs, theirs) = supplement::refract(d, s.normal, s.ior_i, s.ior_t, d_l, n_l).expect("transmitted");
             let ours =
                 direction_derivative(after.momentum, s.momentum_out / s.ior_t.ior, s.ior_t.ior, s.ior_t.dior_dlambda);
             // Both formulas cancel by at most 1/ω² here, ω being above 0.1.
+            assert!((d_theirs - s.momentum_out / s.ior_t.ior).length() < 1e-14, "{d_theirs}");
             assert!((theirs - ours).length() < 1e-12 * ours.length(), "{theirs} {ours}");
         }
     }

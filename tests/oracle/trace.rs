@@ -321,8 +321,8 @@ impl Tracer {
                 let on_unit = &o + &u.scale(&t);
                 // ∇|A(q−c)|² = 2 Aᵀ A (q − c)
                 let mut gradient = Vector::zero();
-                for i in 0..3 {
-                    gradient = &gradient + &rows[i].scale(&on_unit.0[i]);
+                for (row, u) in rows.iter().zip(&on_unit.0) {
+                    gradient = &gradient + &row.scale(u);
                 }
                 let n = gradient.unit();
                 (t, n.clone(), n)
