@@ -21,7 +21,7 @@ mod writer;
 use std::borrow::Cow;
 use std::path::Path;
 
-pub use merge::merge;
+pub use merge::{PER_PART, merge};
 pub use reader::Reader;
 
 use crate::error::Result;

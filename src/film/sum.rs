@@ -73,6 +73,18 @@ impl TreeSum {
     }
 }
 
+/// What a pixel stores of `count` valid samples that sum to `sum`: their mean, or 0 where there is none.
+///
+/// Whoever finishes a sum does it here, so that a merged render rounds like an undivided one.
+pub fn mean(sum: f64, count: u32) -> f32 {
+    if count == 0 { 0.0 } else { (sum / f64::from(count)) as f32 }
+}
+
+/// What the `valid` channel stores: the fraction of `samples` that have a value.
+pub fn valid_fraction(count: u32, samples: u32) -> f32 {
+    (f64::from(count) / f64::from(samples)) as f32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

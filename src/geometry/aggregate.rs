@@ -1,42 +1,268 @@
 //! All instances of a scene under one tree.
 
+use std::cmp::Ordering;
+
 use glam::DVec3;
 
-use super::{Departures, Hit, Instance, Ray};
+use super::mesh::{Mesh, MeshHit};
+use super::placed::{ObjectRay, Placed};
+use super::start::{Met, Relation, Start, behind, relation};
+use super::tree::Tree;
+use super::{Departures, Hit, Instance, Ray, Shape};
 use crate::ray::LocalSurface;
 
 /// Everything that rays can meet.
 #[derive(Debug)]
-pub struct Aggregate {}
+pub struct Aggregate {
+    placed: Vec<Placed>,
+    tree: Tree,
+    /// Which instance each primitive of the tree is: those without extent are left out.
+    instances: Vec<u32>,
+    /// Largest condition and largest translation of all instances.
+    spread: f64,
+    farthest: f64,
+}
 
 impl Aggregate {
     /// Builds the tree over `instances` relative to `origin`, the point of the stage's world that is render space's zero.
-    pub fn build(_instances: &[Instance], _origin: DVec3) -> Self {
-        todo!()
+    ///
+    /// Transforms are finite and not singular; whoever reads them refuses others.
+    pub fn build(instances: &[Instance], origin: DVec3) -> Self {
+        let placed: Vec<Placed> = instances.iter().map(|instance| Placed::new(instance, origin)).collect();
+        let (instances, bounds): (Vec<u32>, Vec<_>) =
+            (0..).zip(&placed).filter_map(|(i, placed)| placed.bounds().map(|bounds| (i, bounds))).unzip();
+        Self {
+            tree: Tree::build(bounds.len(), |i| bounds[i]),
+            instances,
+            spread: placed.iter().map(Placed::condition).fold(1.0, f64::max),
+            farthest: placed.iter().map(|p| p.translation.abs().max_element()).fold(0.0, f64::max),
+            placed,
+        }
     }
 
     /// The nearest surface that the ray meets; equal distances are decided by (instance, primitive).
-    pub fn intersect(&self, _ray: &Ray, _departures: &Departures) -> Option<Hit> {
-        todo!()
+    ///
+    /// `departures` says which surfaces the ray starts on.
+    pub fn intersect(&self, ray: &Ray, departures: &Departures) -> Option<Hit> {
+        let mut nearest = Nearest { hit: None, limit: f64::INFINITY };
+        if departures.is_none() {
+            self.tree.walk(ray.origin, ray.direction, 0.0, f64::INFINITY, self.spread, |i, _| {
+                let instance = self.instances[i as usize];
+                self.placed[instance as usize].intersect(ray, instance, None, &mut nearest);
+                nearest.limit
+            });
+        } else {
+            let reach = departures.crossings().iter().map(|c| self.placed[c.instance as usize].reach(c.primitive));
+            let magnitude = ray.origin.abs().max_element() + reach.fold(0.0, f64::max);
+            let from = -behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest));
+            self.tree.walk(ray.origin, ray.direction, from, f64::INFINITY, self.spread, |i, _| {
+                let instance = self.instances[i as usize];
+                let standing = Some((departures, magnitude));
+                self.placed[instance as usize].intersect(ray, instance, standing, &mut nearest);
+                nearest.limit
+            });
+        }
+        nearest.hit
     }
 
-    /// Calls `f` with every crossing of the ray with a surface, in no particular order.
-    pub fn crossings(&self, _ray: &Ray, _f: &mut dyn FnMut(&Hit)) {
-        todo!()
+    /// Calls `f` with every crossing of the ray with a surface at a distance > 0, in no particular order.
+    ///
+    /// Closed shapes are entered as often as they are left, unless the ray starts inside; edges and vertices count as the
+    /// faces that a ray beside them crosses.
+    pub fn crossings(&self, ray: &Ray, f: &mut dyn FnMut(&Hit)) {
+        self.tree.walk(ray.origin, ray.direction, 0.0, f64::INFINITY, self.spread, |i, limit| {
+            let instance = self.instances[i as usize];
+            self.placed[instance as usize].crossings(ray, instance, f);
+            limit
+        });
     }
 
     /// The hit point, on the surface to rounding, and the surface around it.
-    pub fn local_surface(&self, _ray: &Ray, _hit: &Hit) -> (DVec3, LocalSurface) {
-        todo!()
+    pub fn local_surface(&self, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
+        self.placed[hit.instance as usize].local_surface(ray, hit)
     }
 
-    /// Texture coordinates at a hit; `None` where none are authored (always, for spheres).
-    pub fn uv(&self, _hit: &Hit, _point: DVec3) -> Option<[f64; 2]> {
-        todo!()
+    /// Texture coordinates at a hit; `None` where none are authored (always, for spheres). `_point`, the refined hit point,
+    /// is for shapes whose coordinates come from the position.
+    pub fn uv(&self, hit: &Hit, _point: DVec3) -> Option<[f64; 2]> {
+        match &*self.placed[hit.instance as usize].shape {
+            Shape::Sphere(_) => None,
+            Shape::Mesh(mesh) => mesh.uv(hit.primitive, hit.barycentric),
+        }
     }
 
     /// The material slot that was hit: 0 for faces in no subset, k + 1 for the k-th subset.
-    pub fn slot(&self, _hit: &Hit) -> u32 {
-        todo!()
+    pub fn slot(&self, hit: &Hit) -> u32 {
+        match &*self.placed[hit.instance as usize].shape {
+            Shape::Sphere(_) => 0,
+            Shape::Mesh(mesh) => mesh.slot(hit.primitive),
+        }
     }
+
+    /// Lower and upper bounds of everything in render space; `None` without extent.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let all = self.placed.iter().filter_map(Placed::bounds).reduce(|a, b| a.union(&b))?;
+        Some([all.min, all.max])
+    }
+
+    /// What `intersect` finds by asking every primitive: the law that trees are tested against.
+    #[doc(hidden)]
+    pub fn intersect_without_tree(&self, ray: &Ray) -> Option<Hit> {
+        let mut nearest = Nearest { hit: None, limit: f64::INFINITY };
+        for (instance, placed) in (0..).zip(&self.placed) {
+            let object = placed.ray(ray);
+            match &*placed.shape {
+                Shape::Sphere(_) => placed.intersect(ray, instance, None, &mut nearest),
+                Shape::Mesh(mesh) => {
+                    let mut sides = Sides::new(f64::INFINITY);
+                    mesh.every_crossing(object.origin, object.direction, |hit| {
+                        sides.offer(object.hit(instance, &hit));
+                    });
+                    if let Some(hit) = sides.first(mesh, ray) {
+                        nearest.offer(hit);
+                    }
+                }
+            }
+        }
+        nearest.hit
+    }
+}
+
+/// The nearest hit so far.
+struct Nearest {
+    hit: Option<Hit>,
+    limit: f64,
+}
+
+impl Nearest {
+    fn offer(&mut self, hit: Hit) {
+        if self.hit.is_none_or(|best| is_before(&hit, &best)) {
+            self.limit = hit.distance;
+            self.hit = Some(hit);
+        }
+    }
+}
+
+/// Nearest entering and nearest leaving hit of one mesh.
+///
+/// Where a ray just touches an edge or a vertex it enters and leaves at one point, and rounding decides which of the two
+/// distances is smaller. Geometry knows better: whatever is met second reaches beyond the plane of what is met first.
+struct Sides {
+    hits: [Option<Hit>; 2],
+    limit: f64,
+}
+
+/// Half the digits: hits further apart are in order beyond doubt.
+const DOUBTFUL: f64 = 1.0 / 67_108_864.0;
+
+impl Sides {
+    fn new(limit: f64) -> Self {
+        Self { hits: [None; 2], limit }
+    }
+
+    /// Takes a hit and returns the distance of the nearest.
+    fn offer(&mut self, hit: Hit) -> f64 {
+        let best = &mut self.hits[usize::from(hit.leaving)];
+        if best.is_none_or(|best| is_before(&hit, &best)) {
+            *best = Some(hit);
+        }
+        self.limit = self.limit.min(hit.distance);
+        self.limit
+    }
+
+    fn first(&self, mesh: &Mesh, ray: &Ray) -> Option<Hit> {
+        let [entering, leaving] = self.hits;
+        let (Some(entering), Some(leaving)) = (entering, leaving) else { return entering.or(leaving) };
+        let (first, second) = if is_before(&entering, &leaving) { (entering, leaving) } else { (leaving, entering) };
+        let size = first.distance + ray.origin.abs().max_element();
+        if second.distance - first.distance > DOUBTFUL * size {
+            return Some(first);
+        }
+        // After the first the ray is on its outward side if it left there.
+        let corners = |hit: &Hit| mesh.corners(hit.primitive);
+        match relation(corners(&second), corners(&first), first.leaving) {
+            Relation::Behind => Some(Hit { distance: first.distance, ..second }),
+            _ => Some(first),
+        }
+    }
+}
+
+/// The order of hits: by distance, then by (instance, primitive).
+fn is_before(a: &Hit, b: &Hit) -> bool {
+    let order = a.distance.total_cmp(&b.distance);
+    order.then((a.instance, a.primitive).cmp(&(b.instance, b.primitive))) == Ordering::Less
+}
+
+impl ObjectRay {
+    /// The hit in render space.
+    fn hit(&self, instance: u32, hit: &MeshHit) -> Hit {
+        Hit {
+            distance: hit.distance / self.stretch,
+            instance,
+            primitive: hit.primitive,
+            barycentric: hit.barycentric,
+            leaving: hit.leaving,
+            at_start: hit.at_start,
+        }
+    }
+}
+
+impl Placed {
+    fn intersect(&self, ray: &Ray, instance: u32, standing: Option<(&Departures, f64)>, nearest: &mut Nearest) {
+        let object = self.ray(ray);
+        let start = standing.map(|(departures, magnitude)| Start {
+            instance,
+            crossings: departures.crossings(),
+            arrival: self.inverse * departures.arrival(),
+            magnitude: self.start_magnitude(magnitude, &object),
+        });
+        match &*self.shape {
+            Shape::Mesh(mesh) => {
+                let mut sides = Sides::new(nearest.limit);
+                mesh.walk(object.origin, object.direction, start.as_ref(), sides.limit * object.stretch, |hit| {
+                    sides.offer(object.hit(instance, &hit)) * object.stretch
+                });
+                if let Some(hit) = sides.first(mesh, ray) {
+                    nearest.offer(hit);
+                }
+            }
+            Shape::Sphere(sphere) => {
+                let roots = sphere.roots(object.origin, object.direction);
+                let found = match start {
+                    Some(start) => start.sphere(sphere.radius(), object.origin, object.direction, roots),
+                    None => roots.and_then(|roots| {
+                        let leaving = roots[0] <= 0.0;
+                        let distance = roots[usize::from(leaving)];
+                        (distance > 0.0).then_some((Met { distance, at_start: false }, leaving))
+                    }),
+                };
+                if let Some((met, leaving)) = found {
+                    nearest.offer(sphere_hit(instance, met.distance / object.stretch, leaving, met.at_start));
+                }
+            }
+        }
+    }
+
+    fn crossings(&self, ray: &Ray, instance: u32, f: &mut dyn FnMut(&Hit)) {
+        let object = self.ray(ray);
+        match &*self.shape {
+            Shape::Mesh(mesh) => mesh.walk(object.origin, object.direction, None, f64::INFINITY, |hit| {
+                f(&object.hit(instance, &hit));
+                f64::INFINITY
+            }),
+            Shape::Sphere(sphere) => {
+                for (root, leaving) in
+                    sphere.roots(object.origin, object.direction).into_iter().flatten().zip([false, true])
+                {
+                    if root > 0.0 {
+                        f(&sphere_hit(instance, root / object.stretch, leaving, false));
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn sphere_hit(instance: u32, distance: f64, leaving: bool, at_start: bool) -> Hit {
+    Hit { distance, instance, primitive: 0, barycentric: [0.0; 2], leaving, at_start }
 }

@@ -1,11 +1,34 @@
-//! Triangle meshes.
+//! Triangle meshes: authored points, 32-bit corners, and only the attributes that say something.
 
-use super::PolygonMesh;
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::Buffer;
+use super::polygons::{Interpolation, PolygonMesh, PrimvarView};
+use super::start::{Start, behind};
+use super::topology;
+use super::tree::{Bounds, Tree};
+use super::triangle::{ShearedRay, TriangleHit};
 use crate::Result;
+
+/// A triangle whose area is below this share of its longest edge squared is a line to the digits of its points.
+const SLIVER: f64 = 1e-12;
+/// Normals that differ from the facet's by less are the facet's, computed by an exporter in f32: sixteen of its steps.
+const FLAT: f64 = 16.0 / 16_777_216.0;
 
 /// Triangles over authored points, with the tree over them.
 #[derive(Debug)]
-pub struct Mesh {}
+pub struct Mesh {
+    points: Buffer<[f32; 3]>,
+    /// Points of each triangle, counter-clockwise seen from outside.
+    triangles: Vec<[u32; 3]>,
+    normals: Option<CornerValues>,
+    normals_reversed: bool,
+    uv: Option<CornerValues>,
+    slots: Option<Vec<u16>>,
+    tree: Tree,
+    bounds: Bounds,
+}
 
 /// What was found when a mesh was made.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -28,9 +51,274 @@ pub struct MeshReport {
     pub normals_reversed: bool,
 }
 
+/// A value at each corner of each triangle.
+#[derive(Debug)]
+struct CornerValues {
+    values: Buffer<f32>,
+    /// Values of each triangle's corners; absent where a point and its value have the same index.
+    indices: Option<Vec<[u32; 3]>>,
+}
+
+impl CornerValues {
+    fn at<const N: usize>(&self, triangle: [u32; 3], primitive: u32) -> [[f32; N]; 3] {
+        let indices = self.indices.as_ref().map_or(triangle, |indices| indices[primitive as usize]);
+        indices.map(|i| {
+            let first = i as usize * N;
+            std::array::from_fn(|k| self.values[first + k])
+        })
+    }
+}
+
+/// A candidate of a mesh, decided.
+pub(super) struct MeshHit {
+    pub(super) primitive: u32,
+    pub(super) distance: f64,
+    pub(super) barycentric: [f64; 2],
+    pub(super) leaving: bool,
+    pub(super) at_start: bool,
+}
+
 impl Mesh {
     /// Checks the arrays, cuts the polygons into triangles and builds the tree.
-    pub fn from_polygons(_polygons: &PolygonMesh<'_>) -> Result<(Self, MeshReport)> {
-        todo!()
+    ///
+    /// Errors begin with the prim path and the attribute. What is only odd (faces of two corners, triangles without area,
+    /// overlapping subsets) is left out and counted in the report.
+    pub fn from_polygons(polygons: &PolygonMesh<'_>) -> Result<(Self, MeshReport)> {
+        polygons.check()?;
+        for (name, primvar, width) in [("normals", &polygons.normals, 3), ("primvars:st", &polygons.uv, 2)] {
+            if let Some(primvar) = primvar {
+                polygons.check_primvar(name, primvar, width)?;
+            }
+        }
+        let mut report =
+            MeshReport { short_faces: polygons.counts.iter().filter(|&&n| n < 3).count(), ..MeshReport::default() };
+        let face_slots = face_slots(polygons, &mut report);
+
+        let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(polygons.counts.len());
+        let mut slots = face_slots.as_ref().map(|_| Vec::new());
+        let mut normals = polygons.normals.as_ref().map(Collector::new);
+        let mut uv = polygons.uv.as_ref().map(Collector::new);
+        polygons.triangulate(|face, corners| {
+            if is_sliver(corners.map(|corner| polygons.point(corner))) {
+                report.degenerate += 1;
+                return;
+            }
+            triangles.push(corners.map(|corner| polygons.indices[corner] as u32));
+            if let (Some(slots), Some(face_slots)) = (&mut slots, &face_slots) {
+                slots.push(face_slots[face]);
+            }
+            for values in [&mut normals, &mut uv].into_iter().flatten() {
+                values.push(face, corners, polygons.indices);
+            }
+        });
+        report.triangles = triangles.len();
+        let imbalance = topology::imbalance(polygons);
+        report.open_edges = imbalance.open;
+        report.misoriented_edges = imbalance.misoriented;
+        report.is_closed = imbalance == topology::Imbalance::default() && !triangles.is_empty();
+
+        let points = polygons.points.clone();
+        let bounds_of = |i: usize| bounds_of(triangles[i].map(|p| points[p as usize]));
+        let tree = Tree::build(triangles.len(), bounds_of);
+        let bounds = (0..triangles.len()).into_par_iter().map(bounds_of).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
+        let mut mesh = Self {
+            points,
+            triangles,
+            normals: normals.map(Collector::finish),
+            normals_reversed: false,
+            uv: uv.map(Collector::finish),
+            slots,
+            tree,
+            bounds,
+        };
+        mesh.settle_normals();
+        report.normals_reversed = mesh.normals_reversed;
+        Ok((mesh, report))
     }
+
+    /// How many triangles rays can meet.
+    pub fn len(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Whether no ray can meet the mesh.
+    pub fn is_empty(&self) -> bool {
+        self.triangles.is_empty()
+    }
+
+    /// Whether shading normals are used: some authored normal differs from its facet's.
+    pub fn has_normals(&self) -> bool {
+        self.normals.is_some()
+    }
+
+    /// Whether texture coordinates are authored.
+    pub fn has_uv(&self) -> bool {
+        self.uv.is_some()
+    }
+
+    /// The slot of a triangle: 0 for faces in no subset, k + 1 for the k-th subset.
+    pub fn slot(&self, primitive: u32) -> u32 {
+        self.slots.as_ref().map_or(0, |slots| slots[primitive as usize].into())
+    }
+
+    /// Lower and upper bounds in object space; `None` if the mesh is empty.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        (!self.is_empty()).then_some([self.bounds.min, self.bounds.max])
+    }
+
+    pub(super) fn corners(&self, primitive: u32) -> [DVec3; 3] {
+        self.corners_f32(primitive).map(widen)
+    }
+
+    /// Texture coordinates at a point of a triangle.
+    pub(super) fn uv(&self, primitive: u32, barycentric: [f64; 2]) -> Option<[f64; 2]> {
+        let [a, b, c] = self.uv.as_ref()?.at::<2>(self.triangles[primitive as usize], primitive);
+        Some(std::array::from_fn(|k| {
+            let [a, b, c] = [a[k], b[k], c[k]].map(f64::from);
+            a + barycentric[0] * (b - a) + barycentric[1] * (c - a)
+        }))
+    }
+
+    /// Authored normals at the corners of a triangle, on the side of the faces.
+    pub(super) fn normals(&self, primitive: u32) -> Option<[DVec3; 3]> {
+        let normals = self.normals.as_ref()?.at::<3>(self.triangles[primitive as usize], primitive);
+        let sign = if self.normals_reversed { -1.0 } else { 1.0 };
+        Some(normals.map(|n| widen(n) * sign))
+    }
+
+    /// Calls `found` with every crossing of the ray that is met before the limit, which `found` returns anew each time.
+    /// All in object space; `start` is absent for rays that start in the open.
+    pub(super) fn walk(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        start: Option<&Start<'_>>,
+        limit: f64,
+        mut found: impl FnMut(MeshHit) -> f64,
+    ) {
+        let sheared = ShearedRay::new(origin, direction);
+        let from = start.map_or(0.0, |start| -behind(start.magnitude));
+        self.tree.walk(origin, direction, from, limit, 1.0, |primitive, limit| {
+            let Some(hit) = sheared.intersect(self.corners_f32(primitive)) else { return limit };
+            let (distance, at_start) = match start {
+                None if hit.distance > 0.0 => (hit.distance, false),
+                None => return limit,
+                Some(start) => {
+                    let relative = |primitive| self.corners(primitive).map(|p| p - origin);
+                    match start.triangle(primitive, &hit, direction, relative(primitive), relative) {
+                        Some(met) => (met.distance, met.at_start),
+                        None => return limit,
+                    }
+                }
+            };
+            let TriangleHit { barycentric, leaving, .. } = hit;
+            found(MeshHit { primitive, distance, barycentric, leaving, at_start })
+        });
+    }
+
+    /// Calls `found` with every crossing at a distance > 0, asking every triangle.
+    pub(super) fn every_crossing(&self, origin: DVec3, direction: DVec3, mut found: impl FnMut(MeshHit)) {
+        let sheared = ShearedRay::new(origin, direction);
+        for primitive in 0..self.triangles.len() as u32 {
+            if let Some(TriangleHit { distance, barycentric, leaving }) = sheared.intersect(self.corners_f32(primitive))
+                && distance > 0.0
+            {
+                found(MeshHit { primitive, distance, barycentric, leaving, at_start: false });
+            }
+        }
+    }
+
+    fn corners_f32(&self, primitive: u32) -> [[f32; 3]; 3] {
+        self.triangles[primitive as usize].map(|p| self.points[p as usize])
+    }
+
+    /// Drops normals that say nothing, and finds out which way the others point.
+    fn settle_normals(&mut self) {
+        if self.normals.is_none() {
+            return;
+        }
+        let (flat, against) = (0..self.triangles.len() as u32)
+            .into_par_iter()
+            .map(|primitive| {
+                let [a, b, c] = self.corners(primitive);
+                let n_g = (b - a).cross(c - a).normalize();
+                let normals = self.normals(primitive).expect("there are normals");
+                let flat = normals.iter().all(|n| (n.normalize_or_zero() - n_g).length() <= FLAT);
+                let against = normals.iter().sum::<DVec3>().dot(n_g) < 0.0;
+                (flat, usize::from(against))
+            })
+            .reduce(|| (true, 0), |x, y| (x.0 && y.0, x.1 + y.1));
+        if flat {
+            self.normals = None;
+        }
+        self.normals_reversed = against * 2 > self.triangles.len();
+    }
+}
+
+/// Collects the values of corners while triangles are made.
+struct Collector<'a> {
+    primvar: &'a PrimvarView<'a>,
+    /// Absent where points and values have the same index.
+    indices: Option<Vec<[u32; 3]>>,
+}
+
+impl<'a> Collector<'a> {
+    fn new(primvar: &'a PrimvarView<'a>) -> Self {
+        let by_point = matches!(primvar.interpolation, Interpolation::Vertex | Interpolation::Varying);
+        Self { primvar, indices: (!by_point || primvar.indices.is_some()).then(Vec::new) }
+    }
+
+    fn push(&mut self, face: usize, corners: [usize; 3], points: &[i32]) {
+        let Some(indices) = &mut self.indices else { return };
+        indices.push(corners.map(|corner| {
+            let element = match self.primvar.interpolation {
+                Interpolation::Constant => 0,
+                Interpolation::Uniform => face,
+                Interpolation::Varying | Interpolation::Vertex => points[corner] as usize,
+                Interpolation::FaceVarying => corner,
+            };
+            self.primvar.indices.map_or(element as u32, |indices| indices[element] as u32)
+        }));
+    }
+
+    fn finish(self) -> CornerValues {
+        CornerValues { values: self.primvar.values.clone(), indices: self.indices }
+    }
+}
+
+/// The slot of each face; `None` without subsets. A face in two subsets belongs to the first.
+fn face_slots(polygons: &PolygonMesh<'_>, report: &mut MeshReport) -> Option<Vec<u16>> {
+    if polygons.subsets.is_empty() {
+        return None;
+    }
+    let mut slots = vec![0; polygons.counts.len()];
+    let mut several = vec![false; slots.len()];
+    for (slot, (_, faces)) in (1..).zip(polygons.subsets) {
+        for &face in *faces {
+            let face = face as usize;
+            match slots[face] {
+                0 => slots[face] = slot,
+                taken => several[face] |= taken != slot,
+            }
+        }
+    }
+    report.faces_in_several_subsets = several.into_iter().filter(|&s| s).count();
+    Some(slots)
+}
+
+/// Whether a triangle has no area to speak of.
+fn is_sliver([a, b, c]: [DVec3; 3]) -> bool {
+    let (e1, e2, e3) = (b - a, c - a, c - b);
+    let longest = e1.length_squared().max(e2.length_squared()).max(e3.length_squared());
+    let twice_area = e1.cross(e2).length();
+    twice_area <= 2.0 * SLIVER * longest
+}
+
+fn bounds_of(corners: [[f32; 3]; 3]) -> Bounds {
+    let [a, b, c] = corners.map(widen);
+    Bounds { min: a.min(b).min(c), max: a.max(b).max(c) }
+}
+
+fn widen([x, y, z]: [f32; 3]) -> DVec3 {
+    DVec3::new(x.into(), y.into(), z.into())
 }

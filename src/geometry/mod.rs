@@ -2,7 +2,7 @@
 //!
 //! Conventions: *render space* is the stage's world minus the camera position, in f64. Points stay as authored, f32 in
 //! object space, and no transform is baked into them; rays go to object space instead. f32 boxes find what a ray may
-//! meet ([`tree`]), f64 shapes decide it ([`triangle`], [`sphere`]), so the tree never decides what is hit. Every
+//! meet (`tree.rs`, `walk.rs`), f64 shapes decide it (`triangle.rs`, `sphere.rs`), so the tree never decides what is hit. Every
 //! tolerance is a rounding bound of the numbers at hand: scaling a scene by a power of two changes no bit.
 //!
 //! A triangle covers its border half-open, by exact signs (`triangle.rs`): a ray through an edge or a vertex of a closed
@@ -14,8 +14,15 @@ mod aggregate;
 mod buffer;
 mod departures;
 mod mesh;
+mod placed;
 mod polygons;
 mod sphere;
+mod start;
+mod surface;
+mod topology;
+mod tree;
+mod triangle;
+mod walk;
 
 use std::sync::Arc;
 

@@ -1,6 +1,10 @@
-//! Polygon meshes as authored.
+//! Polygon meshes as authored: checked here, and cut into triangles.
+
+use earcut::Earcut;
+use glam::{DVec2, DVec3};
 
 use super::Buffer;
+use crate::{Error, Result};
 
 /// How the values of a primvar belong to a mesh (UsdGeomPrimvar).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +32,16 @@ impl Interpolation {
             "faceVarying" => Self::FaceVarying,
             _ => return None,
         })
+    }
+
+    /// What there is one value for.
+    fn element(self) -> &'static str {
+        match self {
+            Self::Constant => "mesh",
+            Self::Uniform => "face",
+            Self::Varying | Self::Vertex => "point",
+            Self::FaceVarying => "face corner",
+        }
     }
 }
 
@@ -63,4 +77,201 @@ pub struct PolygonMesh<'a> {
     pub uv: Option<PrimvarView<'a>>,
     /// Faces with slots of their own: prim path of the subset and face indices.
     pub subsets: &'a [(&'a str, &'a [i32])],
+}
+
+impl<'a> PolygonMesh<'a> {
+    /// An error at one of the mesh's attributes.
+    fn error(&self, attribute: &str, problem: impl Into<String>) -> Error {
+        Error::scene(format!("{}.{attribute}", self.path), problem)
+    }
+
+    /// Checks points and topology; everything after may index without fear.
+    pub(super) fn check(&self) -> Result<()> {
+        // Corners and points are counted in 31 bits.
+        for (name, len) in [("points", self.points.len()), ("faceVertexIndices", self.indices.len())] {
+            if len >= 1 << 31 {
+                return Err(self.error(name, format!("{len} elements are more than 2147483647; split the mesh")));
+            }
+        }
+        if let Some(i) = self.points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+            return Err(self.error("points", format!("point {i} is not finite; correct or remove it")));
+        }
+        if let Some(i) = self.counts.iter().position(|&n| n < 0) {
+            return Err(self.error("faceVertexCounts", format!("face {i} has {} corners", self.counts[i])));
+        }
+        let corners: u64 = self.counts.iter().map(|&n| n as u64).sum();
+        if corners != self.indices.len() as u64 {
+            return Err(self.error(
+                "faceVertexCounts",
+                format!(
+                    "counts add up to {corners}, but faceVertexIndices has {}; they must agree",
+                    self.indices.len()
+                ),
+            ));
+        }
+        let points = self.points.len();
+        if let Some(i) = out_of_range(self.indices, points) {
+            return Err(self.error(
+                "faceVertexIndices",
+                format!("index {i} is {}, but there are {points} points", self.indices[i]),
+            ));
+        }
+        let faces = self.counts.len();
+        if let Some(i) = out_of_range(self.holes, faces) {
+            return Err(
+                self.error("holeIndices", format!("index {i} is {}, but there are {faces} faces", self.holes[i]))
+            );
+        }
+        for (path, subset) in self.subsets {
+            if let Some(i) = out_of_range(subset, faces) {
+                let problem = format!("index {i} is {}, but {} has {faces} faces", subset[i], self.path);
+                return Err(Error::scene(format!("{path}.indices"), problem));
+            }
+        }
+        if self.subsets.len() > usize::from(u16::MAX) {
+            return Err(
+                self.error("subsets", format!("{} subsets are more than 65535; merge some", self.subsets.len()))
+            );
+        }
+        Ok(())
+    }
+
+    /// Checks a primvar with `width` floats a value.
+    pub(super) fn check_primvar(&self, name: &str, primvar: &PrimvarView<'_>, width: usize) -> Result<()> {
+        let values = primvar.values.len() / width;
+        if primvar.values.len() % width != 0 {
+            return Err(self.error(name, format!("{} floats are not a multiple of {width}", primvar.values.len())));
+        }
+        if let Some(i) = primvar.values.iter().position(|x| !x.is_finite()) {
+            return Err(self.error(name, format!("value {} is not finite; correct or remove it", i / width)));
+        }
+        let elements = match primvar.interpolation {
+            Interpolation::Constant => 1,
+            Interpolation::Uniform => self.counts.len(),
+            Interpolation::Varying | Interpolation::Vertex => self.points.len(),
+            Interpolation::FaceVarying => self.indices.len(),
+        };
+        let given = primvar.indices.map_or(values, <[i32]>::len);
+        if given != elements {
+            let element = primvar.interpolation.element();
+            let problem =
+                format!("{given} values for one per {element}, which makes {elements}; author the missing ones");
+            return Err(self.error(name, problem));
+        }
+        if let Some(indices) = primvar.indices
+            && let Some(i) = out_of_range(indices, values)
+        {
+            let problem = format!("index {i} is {}, but there are {values} values", indices[i]);
+            return Err(self.error(&format!("{name}:indices"), problem));
+        }
+        Ok(())
+    }
+
+    /// Which faces are not holes and have at least three corners, with their first corner and their number of corners.
+    pub(super) fn faces(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
+        let mut holes = vec![false; if self.holes.is_empty() { 0 } else { self.counts.len() }];
+        for &hole in self.holes {
+            holes[hole as usize] = true;
+        }
+        let mut next = 0;
+        self.counts.iter().enumerate().filter_map(move |(face, &count)| {
+            let first = next;
+            next += count as usize;
+            (count >= 3 && !holes.get(face).is_some_and(|&hole| hole)).then_some((face, first, count as usize))
+        })
+    }
+
+    /// The point at a corner.
+    pub(super) fn point(&self, corner: usize) -> DVec3 {
+        let [x, y, z] = self.points[self.indices[corner] as usize];
+        DVec3::new(x.into(), y.into(), z.into())
+    }
+
+    /// Calls `emit` with every triangle: its face and its corners (positions in `indices`), counter-clockwise seen from
+    /// outside whatever the authored orientation.
+    pub(super) fn triangulate(&self, mut emit: impl FnMut(usize, [usize; 3])) {
+        let mut cutter = Cutter::default();
+        for (face, first, count) in self.faces() {
+            let mut put = |a: usize, b: usize, c: usize| {
+                let corners = if self.left_handed {
+                    [first + a, first + c, first + b]
+                } else {
+                    [first + a, first + b, first + c]
+                };
+                emit(face, corners);
+            };
+            if count == 3 {
+                put(0, 1, 2);
+                continue;
+            }
+            cutter.outline.clear();
+            cutter.outline.extend((first..first + count).map(|corner| self.point(corner)));
+            if cutter.is_convex() {
+                for k in 1..count - 1 {
+                    put(0, k, k + 1);
+                }
+            } else {
+                cutter.cut();
+                for t in cutter.triangles.chunks_exact(3) {
+                    put(t[0] as usize, t[1] as usize, t[2] as usize);
+                }
+            }
+        }
+    }
+}
+
+/// The first index that is negative or not below `len`.
+fn out_of_range(indices: &[i32], len: usize) -> Option<usize> {
+    indices.iter().position(|&i| usize::try_from(i).map_or(true, |i| i >= len))
+}
+
+/// Cuts one polygon after the other; keeps its memory.
+#[derive(Default)]
+struct Cutter {
+    outline: Vec<DVec3>,
+    triangles: Vec<u32>,
+    earcut: Earcut<f64>,
+}
+
+impl Cutter {
+    /// Twice the vector area (Newell 1972), relative to the first corner so that far polygons keep their digits.
+    fn newell(&self) -> DVec3 {
+        let first = self.outline[0];
+        self.outline.windows(2).map(|w| (w[0] - first).cross(w[1] - first)).sum()
+    }
+
+    /// Whether no corner turns inward and the fan from the first corner does not overlap itself.
+    fn is_convex(&self) -> bool {
+        let normal = self.newell();
+        let n = self.outline.len();
+        let p = |i: usize| self.outline[i % n];
+        (0..n).all(|i| {
+            let turn = (p(i + 1) - p(i)).cross(p(i + 2) - p(i + 1));
+            let fan = (p(i) - p(0)).cross(p(i + 1) - p(0));
+            turn.dot(normal) >= 0.0 && fan.dot(normal) >= 0.0
+        })
+    }
+
+    /// Cuts ears on the Newell plane; the triangles wind as the polygon does.
+    fn cut(&mut self) {
+        let normal = self.newell();
+        let size = normal.abs();
+        // Dropping the axis nearest to the normal projects without much distortion, and changes no digit.
+        let z = if size.x >= size.y && size.x >= size.z {
+            0
+        } else if size.y >= size.z {
+            1
+        } else {
+            2
+        };
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        self.earcut.earcut(self.outline.iter().map(|p| [p[x], p[y]]), &[], &mut self.triangles);
+        let flat = |i: u32| DVec2::new(self.outline[i as usize][x], self.outline[i as usize][y]);
+        for t in self.triangles.chunks_exact_mut(3) {
+            let winding = (flat(t[1]) - flat(t[0])).perp_dot(flat(t[2]) - flat(t[0]));
+            if winding * normal[z] < 0.0 {
+                t.swap(1, 2);
+            }
+        }
+    }
 }

@@ -56,7 +56,7 @@ impl Needs {
             Columns::None
         } else if has(Family::LambdaSecondOrder) {
             Columns::SecondOrder
-        } else if has(Family::ScreenColumns) || has(Family::ScreenSecondOrder) {
+        } else if has(Family::ScreenColumns) || has(Family::ScreenSecondOrder) || has(Family::Retrace) {
             Columns::Screen
         } else if has(Family::LambdaColumn) {
             Columns::Lambda

@@ -511,12 +511,12 @@ fn reasons(
     decide(
         "wavelength column ∂λ",
         needs.columns >= Columns::Lambda,
-        &[LambdaColumn, LambdaSecondOrder, ScreenColumns, ScreenSecondOrder],
+        &[LambdaColumn, LambdaSecondOrder, ScreenColumns, ScreenSecondOrder, Retrace],
     );
     decide(
         "screen columns ∂x, ∂y",
         needs.columns >= Columns::Screen,
-        &[ScreenColumns, ScreenSecondOrder, LambdaSecondOrder],
+        &[ScreenColumns, ScreenSecondOrder, LambdaSecondOrder, Retrace],
     );
     decide("second order ∂²λ", needs.columns >= Columns::SecondOrder, &[LambdaSecondOrder]);
     decide("second chain along the screen motion", needs.second_chain, &[ScreenSecondOrder]);

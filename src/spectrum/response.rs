@@ -9,8 +9,11 @@ use super::{LONGEST, SHORTEST, Wavelength};
 /// 360–830 nm. The wavelengths of `dispersion_r`, `_g`, `_b` unless settings say otherwise.
 ///
 /// [`centroids`] computes them; a test compares.
-pub const CENTROIDS: [Wavelength; 3] =
-    [Wavelength::from_nanometers(591.0), Wavelength::from_nanometers(540.0), Wavelength::from_nanometers(450.0)];
+pub const CENTROIDS: [Wavelength; 3] = [
+    Wavelength::from_nanometers(601.243_470_916),
+    Wavelength::from_nanometers(540.672_008_547),
+    Wavelength::from_nanometers(451.793_973_038),
+];
 
 /// CIE 1931 colour-matching functions x̄, ȳ, z̄ at `wavelength`.
 pub fn color_matching(wavelength: Wavelength) -> [f64; 3] {

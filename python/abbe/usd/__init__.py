@@ -97,7 +97,7 @@ def list_cameras(
     Returns
     -------
     list of CameraInfo
-        One of them has ``is_default`` set: that which :func:`describe` takes if none is asked for. Empty if there are none.
+        One of them has ``is_default`` set: that which :func:`describe` takes if none is asked for.
     """
     from .listing import cameras
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Array", "Arrays", "Description", "Diagnostics"]
+__all__ = ["Array", "ArrayTable", "Description", "Diagnostics"]
 
 Array = npt.NDArray[Any]
 """A float32 or int32 array of shape (n,) or (n, k); usually USD's own memory, read-only."""

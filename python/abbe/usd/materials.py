@@ -6,6 +6,7 @@ the shader's own default and are left out.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from . import tokens
@@ -16,11 +17,15 @@ from .values import authored, authored_namespace, place
 __all__ = ["MaterialReader", "warn_unknown_names"]
 
 
-def warn_unknown_names(prim: Any, names: Any, known: tuple[str, ...], diagnostics: Diagnostics) -> None:
+def warn_unknown_names(
+    path: str, names: Iterable[str], known: Mapping[str, str], diagnostics: Diagnostics, *, prefix: str = ""
+) -> None:
     """Warn of ``abbe:`` attributes that no schema of ours declares: they are most often misspelt."""
     for name in names:
         if name not in known:
-            diagnostics.warn("unknown-attribute", f"{place(prim)}.{name}", "abbe knows no such attribute: check its name")
+            diagnostics.warn(
+                "unknown-attribute", f"<{path}>.{prefix}{name}", "abbe has no such attribute: check its name"
+            )
 
 
 class MaterialReader:
@@ -46,7 +51,9 @@ class MaterialReader:
             if relationship:
                 targets = ", ".join(f"<{target}>" for target in relationship.GetTargets())
                 self._diagnostics.warn(
-                    "missing-material", place(prim), f"is bound to {targets or 'nothing'}, which is no material on the stage"
+                    "missing-material",
+                    place(prim),
+                    f"is bound to {targets or 'nothing'}, which is no material on the stage",
                 )
             result.append(None)
         return result
@@ -72,16 +79,19 @@ class MaterialReader:
             self._diagnostics.warn("material-without-surface", place(prim), "the material has no surface shader")
         else:
             material["surface"] = surface
-        for names in (material["abbe"], interface, surface["abbe"] if surface else {}):
-            warn_unknown_names(prim, names, tokens.MATERIAL_NAMES, self._diagnostics)
+            self._check_names(surface["path"], surface["abbe"], tokens.INPUTS_PREFIX)
+        self._check_names(material["path"], material["abbe"])
+        self._check_names(material["path"], interface, tokens.INPUTS_PREFIX)
         return material
+
+    def _check_names(self, path: str, names: Iterable[str], prefix: str = "") -> None:
+        warn_unknown_names(path, names, tokens.MATERIAL_NAMES, self._diagnostics, prefix=prefix)
 
     def _surface(self, prim: Any) -> dict[str, Any] | None:
         """Return the surface shader of the first render context that leads to one."""
         material = UsdShade.Material(prim)
-        first = [f"{tokens.OUTPUTS_PREFIX}{context}{':' if context else ''}{tokens.SURFACE}" for context in tokens.RENDER_CONTEXTS]
         others = sorted(output.GetFullName() for output in material.GetSurfaceOutputs())
-        for name in dict.fromkeys([*first, *others]):
+        for name in dict.fromkeys([*tokens.SURFACE_OUTPUTS, *others]):
             attribute = prim.GetAttribute(name)
             if not attribute or not attribute.HasAuthoredConnections():
                 continue

@@ -1,8 +1,8 @@
 """Render settings, products and variables, flattened by the rules of UsdRenderComputeSpec.
 
-``UsdRenderComputeSpec`` (pxr/usd/usdRender/spec.cpp) has no Python binding, so its rules stand here: a product begins as
-a copy of the settings' base attributes, fallbacks included, and overrides them with what is authored on it; variables
-are taken once each, in order. Two differences: a resolution counts only if authored somewhere, and
+``UsdRenderComputeSpec`` (pxr/usd/usdRender/spec.cpp) has no Python binding, so its rules stand here: a product begins
+as a copy of the settings' base attributes, fallbacks included, and overrides them with what is authored on it;
+variables are taken once each, in order. Two differences: a resolution counts only if authored somewhere, and
 ``instantaneousShutter`` (read from the wrong attribute upstream) is honoured.
 """
 
@@ -10,17 +10,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..errors import StageError
 from . import tokens
-from ._pxr import Sdf, UsdGeom, UsdRender
+from ._pxr import Sdf, Usd, UsdGeom, UsdRender
 from .description import Diagnostics
 from .materials import warn_unknown_names
 from .values import authored_namespace, place, plain, read
 
-__all__ = ["all_settings", "expand_frame_tokens", "find_settings", "read_settings"]
+__all__ = ["all_settings", "expand_frame_tokens", "find_settings", "read_settings", "token_list"]
 
 
 def all_settings(stage: Any) -> list[Any]:
@@ -54,6 +54,22 @@ def find_settings(stage: Any, wanted: str | None, source: str, diagnostics: Diag
                 "(--render-settings) or author the stage's renderSettingsPrimPath",
             )
     return found[0] if len(found) == 1 else None
+
+
+def token_list(settings: Any, name: str) -> list[str] | None:
+    """Return an attribute of tokens; None where there is no value.
+
+    Raises
+    ------
+    StageError
+        It holds something else.
+    """
+    value = plain(read(settings, name, Usd.TimeCode.Default()))
+    if value is None:
+        return None
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        raise StageError(f"{place(settings)}.{name} = {value}: is no list of tokens: correct the value")
+    return value
 
 
 def _typed(stage: Any, wanted: str, schema: Any, type_name: str, where: str) -> Any:
@@ -224,10 +240,10 @@ class _Reader:
             found.update(authored_namespace(prim, namespace, self._time, strip=True))
         return found
 
-    def ours(self, prim: Any, known: tuple[str, ...]) -> dict[str, Any]:
+    def ours(self, prim: Any, known: Mapping[str, str]) -> dict[str, Any]:
         """Return the authored ``abbe:`` attributes; unknown ones are warned of."""
         found = authored_namespace(prim, tokens.ABBE, self._time)
-        warn_unknown_names(prim, found, known, self._diagnostics)
+        warn_unknown_names(str(prim.GetPath()), found, known, self._diagnostics)
         return found
 
     def targets(self, prim: Any, name: str, schema: Any, type_name: str) -> list[Any]:
@@ -276,7 +292,7 @@ _TOKEN = re.compile(
     r"""
       <(?P<angle>FF|F|N|OS)(?P<angle_width>\d*)>          # RenderMan, Arnold: <F4>, <FF>, <N>, <OS>
     | \$\{(?P<brace>FF|F)(?P<brace_width>\d*)\}           # ${F4}
-    | \$(?P<dollar>FF|F)(?P<dollar_width>\d*)(?![A-Za-z_]) # Houdini, Arnold: $F4, $FF
+    | \$(?P<dollar>FF|F)(?:(?P<dollar_width>\d+)|(?![A-Za-z])) # Houdini, Arnold: $F4, $FF
     | %(?P<zero>0?)(?P<percent_width>\d*)(?P<percent>[dg]) # C: %04d, %g
     | (?P<hashes>\#+)(?P<fraction>\.\#+)?                  # usdrecord: ####, ###.##
     """,
@@ -287,12 +303,12 @@ _TOKEN = re.compile(
 def expand_frame_tokens(name: str, frame: float, product: str = "", ordinal: int = 0) -> str:
     """Return ``name`` with frame tokens replaced.
 
-    Understood are those of usdrecord (``####``, ``###.##``), RenderMan (``<F4>``, ``<N>`` the product's ordinal, ``<OS>``
-    its prim name), Houdini and Arnold (``$F4``, ``${F4}``, ``$FF``) and C (``%04d``, ``%g``). Those with a fraction
-    (``FF``, ``%g``, ``#.#``) write it; the others write the frame's whole part.
+    Understood are those of usdrecord (``####``, ``###.##``), RenderMan (``<F4>``, ``<N>`` the product's ordinal,
+    ``<OS>`` its prim name), Houdini and Arnold (``$F4``, ``${F4}``, ``$FF``) and C (``%04d``, ``%g``). Those with a
+    fraction (``FF``, ``%g``, ``#.#``) write it; the others write the frame's whole part.
     """
     whole = math.floor(frame)
-    exact = f"{frame:g}" if frame == round(frame, 6) else repr(frame)
+    exact = str(whole) if frame == whole else repr(frame)
 
     def replace(match: re.Match[str]) -> str:
         kind = match["angle"] or match["brace"] or match["dollar"]

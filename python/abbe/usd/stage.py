@@ -11,15 +11,25 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from ..errors import StageError, UsageError
 from . import tokens
-from ._pxr import Ar, Pcp, Sdf, Usd, UsdUtils
+from ._pxr import Ar, Pcp, Sdf, Tf, Usd, UsdUtils
 from .description import Diagnostics
-from .values import TfError, place
+from .values import place
 
-__all__ = ["OpenedStage", "composition_warnings", "open_stage", "quiet_usd"]
+__all__ = [
+    "OpenedStage",
+    "Overrides",
+    "composition_warnings",
+    "open_stage",
+    "quiet_usd",
+    "source_name",
+    "stage_metadata",
+    "stage_time",
+]
 
 Overrides = Mapping[str, Any] | Sequence[str]
 """``{"/World/Glass.inputs:ior": 1.6}`` or ``["/World/Glass.inputs:ior=1.6"]``."""
@@ -37,7 +47,11 @@ class OpenedStage:
 
 def source_name(stage_or_path: Any) -> str:
     """Return what messages call a stage: its path as given, or its root layer."""
-    return stage_or_path.GetRootLayer().identifier if isinstance(stage_or_path, Usd.Stage) else str(stage_or_path)
+    if not isinstance(stage_or_path, Usd.Stage):
+        return str(stage_or_path)
+    root = stage_or_path.GetRootLayer()
+    # An anonymous layer's identifier is an address, which no two runs share.
+    return str(root.GetDisplayName() or "stage in memory") if root.anonymous else str(root.realPath or root.identifier)
 
 
 @contextmanager
@@ -46,19 +60,35 @@ def quiet_usd(source: str, diagnostics: Diagnostics) -> Iterator[None]:
 
     Composition errors are reported by :func:`composition_warnings`, with prim paths; a crate file's age is not the
     user's concern.
+
+    Raises
+    ------
+    StageError
+        A call of USD failed that is not expected to: the stage is at fault.
     """
     delegate = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         yield
+    except Tf.ErrorException as error:
+        raise StageError(f"{source}: USD cannot read it: {_usd_reason(error)}: correct the file") from error
     finally:
         try:
-            for item in delegate.TakeUncoalescedDiagnostics():
-                if not any(name in item.sourceFunction for name in _REPORTED_ELSEWHERE):
-                    message = " ".join(str(item.commentary).split())
-                    diagnostics.warn("usd", source, _ADDRESS.sub("", message))
+            items = delegate.TakeUncoalescedDiagnostics()
+            new = [item for item in items if not any(name in item.sourceFunction for name in _REPORTED_ELSEWHERE)]
+            # Several threads compose a stage, so that the order says nothing.
+            for message in sorted(map(_commentary, new)):
+                diagnostics.warn("usd", source, message)
         finally:
             # The delegate listens until it is destroyed.
             del delegate
+
+
+def _commentary(item: Any) -> str:
+    """Return what USD says, on one line and without addresses, which no two runs share."""
+    try:
+        return _ADDRESS.sub("", " ".join(str(item.commentary).split()))
+    except UnicodeDecodeError:
+        return "USD met something that is no text"
 
 
 # UsdStage::_ReportErrors, Sdf_CrateFile::_CheckFileVersion, UsdShadeMaterialBindingAPI's BindingsAtPrim (a missing API
@@ -68,10 +98,15 @@ _ADDRESS = re.compile(r" <0x[0-9a-f]+>")
 _COMMENTARY = re.compile(r"at line \d+ in file \S+ : '(.*?)'\s*(?=\n|$)", re.DOTALL)
 
 
-def _tf_reason(error: BaseException) -> str:
+def _usd_reason(error: BaseException) -> str:
     """Return the first reason in a Tf error, on one line and without USD's own source positions."""
-    found = _COMMENTARY.findall(str(error))
-    text = found[0] if found else str(error)
+    try:
+        text = str(error)
+    except UnicodeDecodeError:
+        # USD quotes what it could not read, and that need not be text.
+        return "the file is not what its name or its beginning says"
+    found = _COMMENTARY.findall(text)
+    text = found[0] if found else text
     text = re.sub(r"pxrInternal_v[0-9_]+pxrReserved__(_pegtl)?::(internal::)?", "", text)
     return " ".join(text.split())
 
@@ -122,27 +157,29 @@ def _context(path: str, search_paths: Sequence[str | os.PathLike[str]], diagnost
     own = resolver.CreateDefaultContextForAsset(path)
     if not search_paths:
         return own
-    folders = [os.path.abspath(os.fspath(folder)) for folder in search_paths]
+    folders = [Path(folder).absolute() for folder in search_paths]
     for folder in folders:
-        if not os.path.isdir(folder):
+        if not folder.is_dir():
             raise UsageError(f"search path {folder}: is no folder: correct or remove it")
     if not isinstance(Ar.GetUnderlyingResolver(), Ar.DefaultResolver):
         diagnostics.warn("search-path", path, "the site's own asset resolver is in use; search paths are ignored")
         return own
-    beside = os.path.dirname(os.path.abspath(path))
-    return Ar.ResolverContext(Ar.DefaultResolverContext([beside, *folders]))
+    beside = Path(path).absolute().parent
+    return Ar.ResolverContext(Ar.DefaultResolverContext([str(folder) for folder in (beside, *folders)]))
 
 
 def _root_layer(path: str, context: Any) -> Any:
-    if os.path.isdir(path):
+    if not path:
+        raise UsageError("stage: the path is empty: give that of a USD file")
+    if Path(path).is_dir():
         raise StageError(f"{path}: is a folder, not a USD file: name the file in it")
     with Ar.ResolverContextBinder(context):
-        if not os.path.exists(path) and not Ar.GetResolver().Resolve(path):
+        if not Path(path).exists() and not Ar.GetResolver().Resolve(path):
             raise FileNotFoundError(f"{path}: there is no such file: check the path")
         try:
             layer = Sdf.Layer.FindOrOpen(path)
-        except TfError as error:
-            raise StageError(f"{path}: cannot be read as USD: {_tf_reason(error)}: export it again") from None
+        except RuntimeError as error:
+            raise StageError(f"{path}: cannot be read as USD: {_usd_reason(error)}: export it again") from None
     if not layer:
         raise StageError(f"{path}: is not a USD file (.usda, .usdc, .usd, .usdz), or it cannot be read: check the file")
     return layer
@@ -151,8 +188,8 @@ def _root_layer(path: str, context: Any) -> Any:
 def _compose(open_it: Any, source: str) -> Any:
     try:
         stage = open_it()
-    except TfError as error:
-        raise StageError(f"{source}: cannot be composed: {_tf_reason(error)}: correct the file") from None
+    except RuntimeError as error:
+        raise StageError(f"{source}: cannot be composed: {_usd_reason(error)}: correct the file") from None
     if not stage:
         raise StageError(f"{source}: cannot be composed: correct the file")
     return stage
@@ -163,7 +200,7 @@ def _from_memory(
 ) -> OpenedStage:
     """Return the caller's stage itself, or, where something is overridden, a second stage on the same layers."""
     root = stage.GetRootLayer()
-    source = root.realPath or root.identifier
+    source = source_name(stage)
     if search_paths:
         raise UsageError("search_paths: a stage in memory is composed already: open it with them, or give its path")
     if not variants and not overrides:
@@ -171,7 +208,9 @@ def _from_memory(
     session = _session_layer()
     theirs = stage.GetSessionLayer()
     if theirs:
-        session.subLayerPaths.append(theirs.identifier)
+        # Stage metadata is read from the session's root layer alone.
+        UsdUtils.CopyLayerMetadata(theirs, session, True)
+        session.subLayerPaths = [theirs.identifier]
     context = stage.GetPathResolverContext()
     mask = stage.GetPopulationMask()
     # Payloads are loaded only once the rules are those of the caller's stage.
@@ -204,7 +243,9 @@ def _select_variant(opened: OpenedStage, text: str) -> None:
     """Select a variant, given as ``/World/Ball{material=glass}``; USD itself would accept names that do not exist."""
     match = _VARIANT.match(text.strip())
     if not match:
-        raise UsageError(f"variant '{text}': is not of the form PRIM{{SET=NAME}}, such as /World/Ball{{material=glass}}")
+        raise UsageError(
+            f"variant '{text}': is not of the form PRIM{{SET=NAME}}, such as /World/Ball{{material=glass}}"
+        )
     prim = _prim(opened, match["prim"], f"variant '{text}'")
     sets = prim.GetVariantSets()
     if match["set"] not in sets.GetNames():
@@ -247,23 +288,30 @@ def _set_value(opened: OpenedStage, target: str, value: Any) -> None:
     prim = _prim(opened, prim_path, option)
     attribute = prim.GetAttribute(name)
     if not attribute:
+        attribute = _our_attribute(prim, name)
+    if not attribute:
         near = sorted(a.GetName() for a in prim.GetAuthoredAttributes())
         raise StageError(f"{place(prim)}: has no attribute '{name}': {_choice('authored attributes', near)}")
+    if attribute.HasAuthoredConnections():
+        driver = attribute.GetConnections()[0]
+        raise StageError(f"{place(prim)}.{name}: is driven by {place(driver)}, so a value has no effect: set that one")
     type_name = attribute.GetTypeName()
     if isinstance(value, str):
         value = _parse(value, type_name, f"{place(prim)}.{name}")
     try:
         done = attribute.Set(value)
-    except (TypeError, *TfError):  # type: ignore[misc]
+    except (TypeError, RuntimeError):
         done = False
     if not done:
         raise StageError(f"{place(prim)}.{name} = {value}: is no value of type {type_name}: correct {option}")
-    if attribute.ValueMightBeTimeVarying():
-        # A default set above time samples is never seen; one sample in a stronger layer replaces them all.
-        attribute.Set(value, Usd.TimeCode(0.0))
 
 
-_TEXT_TYPES = ("string", "token", "asset")
+def _our_attribute(prim: Any, name: str) -> Any:
+    """Return an attribute of our own schemas, declared where the prim's type may carry it; else None."""
+    for schema, names in tokens.OUR_SCHEMAS.items():
+        if prim.GetTypeName() == schema and name in names:
+            return prim.CreateAttribute(name, Sdf.ValueTypeNames.Find(names[name]), False)
+    return None
 
 
 def _parse(text: str, type_name: Any, where: str) -> Any:
@@ -281,10 +329,12 @@ def _parse(text: str, type_name: Any, where: str) -> Any:
     layer = Sdf.Layer.CreateAnonymous("abbe-value.usda")
     try:
         read = layer.ImportFromString(f'#usda 1.0\nover "x"\n{{\n    {name} value = {text}\n}}\n')
-    except TfError:
+    except RuntimeError:
         read = False
     spec = layer.GetAttributeAtPath("/x.value") if read else None
     if spec is None or spec.default is None or len(layer.rootPrims) != 1 or len(layer.rootPrims[0].properties) != 1:
+        raise problem
+    if not set(spec.ListInfoKeys()) <= {"custom", "default", "typeName", "variability"}:
         raise problem
     return spec.default
 
@@ -296,8 +346,8 @@ def _unquoted(text: str) -> str:
 def stage_time(stage: Any, frame: float | str | None) -> tuple[Any, float | None]:
     """Return the time code to read at, and its number (None where it has none).
 
-    None means the stage's authored start; without one the earliest sample of each attribute, as usdrecord has it, so that
-    attributes with time samples alone still have a value. ``"default"`` means the default values.
+    None means the stage's authored start; without one the earliest sample of each attribute, as usdrecord has it, so
+    that attributes with time samples alone still have a value. ``"default"`` means the default values.
     """
     if isinstance(frame, str):
         if frame != "default":
@@ -373,11 +423,14 @@ def composition_warnings(opened: OpenedStage, missing: str, diagnostics: Diagnos
     StageError
         ``missing`` is ``"error"`` and a layer or prim that is referred to is not there.
     """
-    for error in _composition_errors(opened.stage):
-        site = getattr(error, "rootSite", None)
-        path = getattr(site, "path", None)
+
+    def described(error: Any) -> tuple[str, str, Any]:
+        path = getattr(getattr(error, "rootSite", None), "path", None)
         where = place(path) if path is not None and not path.isEmpty else opened.source
-        text = " ".join(str(error).split())
+        return where, " ".join(str(error).split()), error
+
+    # USD gives them in no order that two runs share.
+    for where, text, error in sorted(map(described, _composition_errors(opened.stage)), key=lambda found: found[:2]):
         kind = "missing-reference" if isinstance(error, _MISSING) else "composition-error"
         target = _ASSET.search(text)
         if kind == "missing-reference" and target and target[1].split(":SDF_FORMAT_ARGS")[0].endswith(".mtlx"):

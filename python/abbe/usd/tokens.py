@@ -1,8 +1,8 @@
 """Every USD name that the bridge reads by name, once.
 
-The names of our own schemas stand in :data:`MATERIAL_NAMES`, :data:`SETTINGS_NAMES` and :data:`VAR_NAMES`; they serve to
-find misspelt attributes, and a test compares them with ``plugin/``. Attributes are read by name, whether or not the
-schemas are registered or applied.
+The names of our own schemas stand with their types in :data:`MATERIAL_NAMES`, :data:`SETTINGS_NAMES` and
+:data:`VAR_NAMES`; they serve to find misspelt attributes, and a test compares them with ``plugin/``. Attributes are
+read by name, whether or not the schemas are registered or applied.
 """
 
 from __future__ import annotations
@@ -68,9 +68,8 @@ FULL_PURPOSE: Final = "full"
 OUTPUTS_PREFIX: Final = "outputs:"
 INPUTS: Final = "inputs"
 INPUTS_PREFIX: Final = "inputs:"
-SURFACE: Final = "surface"
-# Render contexts whose surface terminal is taken first; any other comes after the universal one.
-RENDER_CONTEXTS: Final = ("abbe", "mtlx", "")
+# The surface terminals in the order they are looked for; those of other render contexts come after.
+SURFACE_OUTPUTS: Final = ("outputs:abbe:surface", "outputs:mtlx:surface", "outputs:surface")
 CONSTANT_NODE_PREFIX: Final = "ND_constant_"
 CONSTANT_NODE_INPUT: Final = "value"
 
@@ -112,43 +111,44 @@ VIEWER_PRODUCT_NAMES: Final = ("ip", "md")
 # Ours.
 ABBE: Final = "abbe"
 ABBE_PREFIX: Final = "abbe:"
-MATERIAL_NAMES: Final = (
-    "abbe:glass",
-    "abbe:dispersion:law",
-    "abbe:dispersion:nd",
-    "abbe:dispersion:vd",
-    "abbe:dispersion:cauchy",
-    "abbe:dispersion:sellmeier:b",
-    "abbe:dispersion:sellmeier:c",
-    "abbe:dispersion:formula",
-    "abbe:dispersion:coefficients",
-    "abbe:dispersion:table",
-    "abbe:extinction:table",
-    "abbe:dispersion:validRange",
-    "abbe:dispersion:outOfRange",
-    "abbe:dispersion:scale",
-    "abbe:internalTransmittance:table",
-    "abbe:internalTransmittance:thickness",
-    "abbe:dielectricPriority",
-)
-SETTINGS_NAMES: Final = (
-    "abbe:integrator",
-    "abbe:samples",
-    "abbe:errorTarget",
-    "abbe:timeLimit",
-    "abbe:referenceWavelength",
-    "abbe:band",
-    "abbe:dispersionScale",
-    "abbe:seed",
-    "abbe:seedPerFrame",
-    "abbe:scalarIor",
-    "abbe:pixelFilter",
-    "abbe:pixelFilterWidth",
-    "abbe:channelWavelengths",
-)
-VAR_NAMES: Final = (
-    "abbe:filter",
-    "abbe:wavelength",
-    "abbe:spectral:band",
-    "abbe:spectral:binWidth",
-)
+MATERIAL_NAMES: Final = {
+    "abbe:glass": "string",
+    "abbe:dispersion:law": "token",
+    "abbe:dispersion:nd": "double",
+    "abbe:dispersion:vd": "double",
+    "abbe:dispersion:cauchy": "double[]",
+    "abbe:dispersion:sellmeier:b": "double[]",
+    "abbe:dispersion:sellmeier:c": "double[]",
+    "abbe:dispersion:formula": "int",
+    "abbe:dispersion:coefficients": "double[]",
+    "abbe:dispersion:table": "double2[]",
+    "abbe:extinction:table": "double2[]",
+    "abbe:dispersion:validRange": "double2",
+    "abbe:dispersion:outOfRange": "token",
+    "abbe:dispersion:scale": "double",
+    "abbe:internalTransmittance:table": "double2[]",
+    "abbe:internalTransmittance:thickness": "double",
+    "abbe:dielectricPriority": "int",
+}
+SETTINGS_NAMES: Final = {
+    "abbe:integrator": "token",
+    "abbe:samples": "int",
+    "abbe:errorTarget": "double",
+    "abbe:timeLimit": "double",
+    "abbe:referenceWavelength": "double",
+    "abbe:band": "double2",
+    "abbe:dispersionScale": "double",
+    "abbe:seed": "int",
+    "abbe:seedPerFrame": "bool",
+    "abbe:scalarIor": "token",
+    "abbe:pixelFilter": "token",
+    "abbe:pixelFilterWidth": "float",
+    "abbe:channelWavelengths": "double3",
+}
+VAR_NAMES: Final = {
+    "abbe:filter": "token",
+    "abbe:wavelength": "double",
+    "abbe:spectral:band": "double2",
+    "abbe:spectral:binWidth": "double",
+}
+OUR_SCHEMAS: Final = {"Material": MATERIAL_NAMES, RENDER_SETTINGS: SETTINGS_NAMES, RENDER_VAR: VAR_NAMES}

@@ -8,10 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from ._pxr import Gf, Sdf, Tf, Usd
+from ._pxr import Gf, Sdf, Usd
 from .description import Array
 
-__all__ = ["authored", "authored_namespace", "float_array", "int_array", "place", "plain", "read"]
+__all__ = [
+    "IDENTITY",
+    "authored",
+    "authored_namespace",
+    "float_array",
+    "int_array",
+    "is_finite",
+    "matrix",
+    "place",
+    "plain",
+    "read",
+]
 
 # 2**31 and beyond do not fit the core's 32-bit indices.
 _INT32 = np.iinfo(np.int32)
@@ -142,18 +153,16 @@ def _array(value: Any, kinds: str) -> Array | None:
 
 _VT_MODULE = "pxr.Vt"
 
-TfError: tuple[type[BaseException], ...] = (Tf.ErrorException, RuntimeError)
-"""What USD raises where a value or file cannot be read."""
 
-
-def is_finite(values: Iterable[float]) -> bool:
+def is_finite(values: list[float]) -> bool:
     """Return whether every number is finite."""
-    return all(math.isfinite(value) for value in values)
+    # A finite sum has finite terms; that of finite terms may still overflow.
+    return math.isfinite(sum(values)) or all(math.isfinite(value) for value in values)
 
 
 def matrix(value: Any) -> list[float]:
     """Return a ``Gf.Matrix4d`` as 16 doubles, row by row."""
-    numbers: list[float] = np.asarray(value, dtype=np.float64).ravel().tolist()
+    numbers: list[float] = np.asarray(value).ravel().tolist()
     return numbers
 
 

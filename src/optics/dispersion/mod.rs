@@ -140,6 +140,9 @@ impl Dispersion {
     /// Refuses a scale that drives the index out of its physical range somewhere in 360–830 nm.
     pub fn scaled(&self, scale: f64) -> Result<Self, String> {
         finite("the dispersion scale", &[scale])?;
+        if self.is_constant() {
+            return Ok(self.clone());
+        }
         let scale = self.scale * scale;
         if scale == 0.0 {
             return Ok(Self { law: Law::Constant(self.ior_d), scale: 1.0, ior_d: self.ior_d });

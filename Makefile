@@ -1,0 +1,107 @@
+# Everything from a fresh clone with Rust, Python >= 3.11 and a C compiler; cargo and pip fetch the rest.
+# .venv/ and the cargo target folder are reused, so a second run does only what changed.
+
+.DEFAULT_GOAL := help
+.PHONY: help build demo test test-rust test-python lint lint-rust lint-python fmt bench stress wheel clean
+
+# The oldest interpreter that is there: the wheel is built against 3.11 and serves every later one.
+PYTHON ?= $(firstword $(foreach p,python3.11 python3.12 python3.13 python3.14 python3,$(if $(shell $(p) --version 2>/dev/null),$(p))))
+VENV := $(CURDIR)/.venv
+BIN := $(VENV)/bin
+TOOLS := $(VENV)/.tools.stamp
+EXTENSION := $(VENV)/.extension.stamp
+WHEEL := dist/.wheel.stamp
+OUT := out
+
+# maturin and pyo3 look for the interpreter here, whichever shell calls make.
+export VIRTUAL_ENV := $(VENV)
+export PYO3_PYTHON := $(BIN)/python
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+unexport PYTHONHOME PYTHONPATH
+
+CORE_SOURCES := Cargo.toml Cargo.lock python/Cargo.toml python/build.rs \
+  $(shell find src python/src plugin -type f 2>/dev/null)
+PACKAGE_SOURCES := pyproject.toml $(wildcard README.md LICENSE-*) \
+  $(shell find python/abbe -type f \( -name '*.py' -o -name '*.pyi' -o -name 'py.typed' \) 2>/dev/null)
+
+help:
+	@echo 'make build   the package with everything, in .venv'
+	@echo 'make demo    build, install into .venv, render stages/prism.usda to $(OUT)/, check it, write a preview'
+	@echo 'make test    every test: Rust, documentation, Python, the wheel in an empty environment'
+	@echo 'make lint    formatting, clippy, rustdoc, ruff, mypy'
+	@echo 'make fmt     format everything'
+	@echo 'make bench   speed and error against time'
+	@echo 'make stress  long randomised comparison with multi-precision arithmetic'
+	@echo 'make wheel   dist/*.whl'
+	@echo 'make clean   remove what these made, but for the cargo target folder'
+
+$(BIN)/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "abbe needs Python 3.11 or later")'
+	$(PYTHON) -m venv $(VENV)
+
+$(TOOLS): pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --group dev
+	@touch $@
+
+# Editable: a change of a Python file needs no installation.
+$(EXTENSION): $(CORE_SOURCES) pyproject.toml $(TOOLS)
+	$(BIN)/maturin develop --release --extras all
+	@touch $@
+
+build: $(EXTENSION)
+
+$(WHEEL): $(CORE_SOURCES) $(PACKAGE_SOURCES) $(TOOLS)
+	@rm -rf dist && mkdir -p dist
+	$(BIN)/maturin build --release --out dist
+	@touch $@
+
+wheel: $(WHEEL)
+	@ls dist/*.whl
+
+demo: $(EXTENSION)
+	@mkdir -p $(OUT)
+	$(BIN)/abbe render stages/prism.usda $(OUT)/prism.exr --preview $(OUT)/prism.png
+	$(BIN)/abbe check $(OUT)/prism.exr
+	@echo 'Look at $(OUT)/prism.png; $(OUT)/prism.exr has every layer.'
+
+test: test-rust test-python
+
+# nextest runs faster where somebody installed it; it has no documentation tests.
+test-rust:
+	@if cargo nextest --version >/dev/null 2>&1; then \
+	  echo 'cargo nextest run' && cargo nextest run && cargo test --doc; \
+	else \
+	  echo 'cargo test' && cargo test; \
+	fi
+
+test-python: $(EXTENSION) $(WHEEL)
+	ABBE_WHEEL="$$(ls $(CURDIR)/dist/*.whl)" $(BIN)/python -m pytest
+
+lint: lint-rust lint-python
+
+lint-rust: $(TOOLS)
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps --document-private-items
+
+lint-python: $(EXTENSION)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest abbe._core
+
+fmt: $(TOOLS)
+	cargo fmt --all
+	$(BIN)/ruff check --fix --quiet
+	$(BIN)/ruff format
+
+bench: $(EXTENSION)
+	cargo bench
+
+stress: $(TOOLS)
+	cargo test --release --test stress -- --ignored --nocapture
+
+clean:
+	rm -rf $(VENV) dist $(OUT) python/abbe/plugin python/abbe/_core*.so
+	find python tests -name __pycache__ -type d -exec rm -rf {} +

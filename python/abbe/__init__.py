@@ -1,0 +1,43 @@
+"""Render USD stages with dispersive glass, and learn how everything seen moves with wavelength.
+
+>>> import abbe
+>>> film = abbe.render("prism.usda", aovs=["dispersion"])
+>>> film["dispersion"].shape
+(540, 960, 2)
+
+Wavelengths are in nanometres, lengths in stage units, pixel vectors +x right and +y up while array rows run down. USD,
+OpenImageIO and Pillow are imported when they are needed; ``pip install 'abbe[all]'`` brings them. Importing this package
+makes its USD schemas known to a USD that is there.
+"""
+
+from __future__ import annotations
+
+from . import schemas as _schemas
+from ._api import Plan, Progress, Scene, integrators, merge, render
+from ._core import Film, __version__
+from .errors import AbbeError, StageError, UsageError, UsdMissingError
+from .optics import Dispersion, Reflected, Refracted, Transferred, reflect, refract, transfer
+
+__all__ = [
+    "AbbeError",
+    "Dispersion",
+    "Film",
+    "Plan",
+    "Progress",
+    "Reflected",
+    "Refracted",
+    "Scene",
+    "StageError",
+    "Transferred",
+    "UsageError",
+    "UsdMissingError",
+    "__version__",
+    "integrators",
+    "merge",
+    "reflect",
+    "refract",
+    "render",
+    "transfer",
+]
+
+_schemas.register()

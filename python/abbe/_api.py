@@ -1,0 +1,468 @@
+"""Scenes and renders: the Python face of the core, with options as keywords and films as arrays."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, TypedDict, Unpack
+
+from . import _core
+from .errors import UsageError
+
+__all__ = ["Options", "Plan", "Progress", "Scene", "integrators", "merge", "render", "warning_text"]
+
+_log = logging.getLogger("abbe")
+
+
+class Progress(NamedTuple):
+    """How far a render is."""
+
+    done: int
+    """Finished pixels."""
+    total: int
+    """All pixels."""
+    seconds: float
+    """Wall time since the render began."""
+
+    @property
+    def fraction(self) -> float:
+        """The finished part, 0 to 1."""
+        return self.done / self.total if self.total else 1.0
+
+    @property
+    def remaining(self) -> float | None:
+        """Seconds left at the rate so far; None before there is a rate."""
+        return self.seconds * (self.total - self.done) / self.done if self.done else None
+
+    def __str__(self) -> str:
+        left = "" if self.remaining is None else f", {self.remaining:.0f} s left"
+        return f"{100 * self.fraction:.0f} %{left}"
+
+
+class Options(TypedDict, total=False):
+    """What a render can be asked for; :func:`render` tells what each means. What is left out, the stage decides."""
+
+    camera: str | None
+    product: str | None
+    width: int | None
+    height: int | None
+    samples: int | None
+    integrator: str | None
+    aovs: Sequence[str] | None
+    wavelength: float | None
+    band: tuple[float, float] | None
+    dispersion_scale: float | None
+    seed: int | None
+    threads: int | None
+    crop: tuple[int, int, int, int] | None
+    sample_range: tuple[int, int] | None
+    strict: bool
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a render will carry and compute, and why; ``str(plan)`` is readable."""
+
+    text: str
+    fields: Mapping[str, Any]
+    """All of it as plain values: ``product``, ``output``, ``resolution``, ``layers``, ``carried``, ``skipped`` …"""
+
+    @property
+    def product(self) -> str:
+        """Path of the RenderProduct; empty if the stage has none."""
+        return str(self.fields["product"])
+
+    @property
+    def output(self) -> str:
+        """File that the product names; empty if it names none."""
+        return str(self.fields["output"])
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def _request(options: Options) -> str:
+    """Return ``options`` as the core's JSON; numbers of NumPy are numbers."""
+    given = {name: value for name, value in options.items() if value is not None}
+    if isinstance(given.get("aovs"), str):
+        raise UsageError(f"aovs: is the text '{given['aovs']}', a list is wanted: put brackets around it")
+
+    def plain(value: Any) -> Any:
+        for method in ("tolist", "__fspath__"):
+            if hasattr(value, method):
+                return getattr(value, method)()
+        raise TypeError(f"is a {type(value).__name__}")
+
+    texts = []
+    for name, value in given.items():
+        try:
+            texts.append(f"{json.dumps(name)}:{json.dumps(value, allow_nan=False, default=plain)}")
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"{name}: {error}: give plain finite numbers, text or lists of them") from None
+    return "{" + ",".join(texts) + "}"
+
+
+def warning_text(warning: Mapping[str, Any]) -> str:
+    """Return a warning record on one line: ``</World/Glass> and 3 more: the mesh is open …``."""
+    place = warning["places"][0] if warning["places"] else ""
+    more = f" and {warning['count'] - 1} more" if warning["count"] > 1 else ""
+    return f"{place}{more}: {warning['message']}"
+
+
+class Scene:
+    """A checked scene: loaded once, rendered often, from several threads if wanted. Nothing changes it."""
+
+    def __init__(self, core: _core.Scene) -> None:
+        self._core = core
+        self._told: list[dict[str, Any]] = core.warnings()
+        for warning in self._told:
+            _log.warning("%s", warning_text(warning))
+
+    @classmethod
+    def from_stage(
+        cls,
+        stage: Any,
+        *,
+        frame: float | Literal["default"] | None = None,
+        camera: str | None = None,
+        render_settings: str | None = None,
+        product: str | None = None,
+        purposes: Sequence[str] | None = None,
+        variants: Sequence[str] = (),
+        overrides: Mapping[str, Any] | Sequence[str] = (),
+        search_paths: Sequence[str | os.PathLike[str]] = (),
+        missing: str = "warn",
+        strict: bool = False,
+    ) -> Scene:
+        """Load a USD stage.
+
+        Parameters
+        ----------
+        stage : path of a .usd, .usda, .usdc or .usdz file, or a ``pxr.Usd.Stage``, which is not changed
+        frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
+        camera : path of a Camera, or the name of the first such; it then replaces the cameras that products name
+        render_settings : path of a RenderSettings prim; the stage's own if None
+        product : path or name of the one RenderProduct to keep
+        purposes : of default, render, proxy, guide; the settings', else default and render, if None
+        variants : selections such as ``"/World/Ball{material=glass}"``
+        overrides : values such as ``"/World/Glass.inputs:ior=1.6"``, or a mapping from attribute path to value
+        search_paths : folders in which relative asset paths are looked up after the stage's own
+        missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+        strict : a stage without a camera is an error
+
+        Returns
+        -------
+        Scene
+            Holds USD's own arrays where they need no conversion.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is no such file.
+        StageError
+            The stage cannot be used; the message begins with the prim path.
+        UsdMissingError
+            No ``pxr`` can be imported.
+        """
+        from .usd import describe
+
+        description = describe(
+            stage,
+            frame=frame,
+            camera=camera,
+            render_settings=render_settings,
+            product=product,
+            purposes=purposes,
+            variants=variants,
+            overrides=overrides,
+            search_paths=search_paths,
+            missing=missing,
+            strict=strict,
+        )
+        return cls(_core.Scene(description.to_json(), description.arrays))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, mapped: bool = False) -> Scene:
+        """Load a scene file that :meth:`save` or ``abbe export`` wrote; USD is not needed.
+
+        Parameters
+        ----------
+        path : a .safetensors file
+        mapped : map the file into memory instead of reading it; it must then not change while the scene is in use
+
+        Returns
+        -------
+        Scene
+            Renders to the same bits as the scene that was saved.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is no such file.
+        AbbeError
+            The file is not a scene, or its content cannot be used.
+        """
+        return cls(_core.Scene.load(Path(path), mapped=mapped))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the scene to a file for :meth:`load` and the program ``abbe-render``.
+
+        Parameters
+        ----------
+        path : where to; complete or not at all
+
+        Raises
+        ------
+        AbbeError
+            It cannot be written.
+        """
+        self._core.save(Path(path))
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The scene description without its arrays, as plain values (a copy)."""
+        document: dict[str, Any] = json.loads(self._core.document())
+        return document
+
+    @property
+    def cameras(self) -> list[str]:
+        """Paths of the cameras in the scene, the default first; empty text for one framed automatically."""
+        return [camera["path"] for camera in self.document["cameras"]]
+
+    @property
+    def warnings(self) -> list[dict[str, Any]]:
+        """What was odd about the stage: dicts with ``kind``, ``message``, ``places`` and ``count``."""
+        return self._core.warnings()
+
+    def plans(self, **options: Unpack[Options]) -> list[Plan]:
+        """Tell what would be rendered, without rendering.
+
+        Parameters
+        ----------
+        options : as for :func:`render`
+
+        Returns
+        -------
+        list of Plan
+            One for each product of the stage that is asked for; one if the stage has none.
+
+        Raises
+        ------
+        UsageError
+            An option contradicts the scene or another option.
+        """
+        return [Plan(text, json.loads(fields)) for text, fields in self._core.plan(_request(options))]
+
+    def trace(self, pixel: tuple[int, int], sample: int = 0, **options: Unpack[Options]) -> dict[str, Any]:
+        """Follow one sample and tell every event of its chain.
+
+        Parameters
+        ----------
+        pixel : x to the right, y down, (0, 0) the top left
+        sample : index of the sample in the pixel
+        options : as for :func:`render`; of several products the first counts
+
+        Returns
+        -------
+        dict
+            ``events``, each with ``event``, ``position``, ``normal``, ``ior``, ``columns`` …, and how the chain ends.
+
+        Raises
+        ------
+        UsageError
+            There is no such sample, or an option contradicts the scene.
+        """
+        return self._core.trace(_request(options), 0, pixel, sample)
+
+    def render(self, *, progress: Callable[[Progress], object] | None = None, **options: Unpack[Options]) -> _core.Film:
+        """Render one image.
+
+        Parameters
+        ----------
+        progress : called about ten times a second; an exception it raises stops the render
+        options : as for :func:`render`
+
+        Returns
+        -------
+        Film
+            As of :func:`render`.
+
+        Raises
+        ------
+        UsageError
+            An option contradicts the scene or another option, or the stage has several products and none is chosen.
+        KeyboardInterrupt
+            Ctrl-C; the finished part is the exception's attribute ``film``, and its statistics say ``complete: False``.
+        """
+        plans = self.plans(**options)
+        if len(plans) > 1:
+            names = ", ".join(plan.product for plan in plans)
+            raise UsageError(f"product: the stage has {len(plans)}: choose one of {names}")
+        return self.render_plan(0, progress=progress, **options)
+
+    def render_plan(
+        self, index: int, *, progress: Callable[[Progress], object] | None = None, **options: Unpack[Options]
+    ) -> _core.Film:
+        """Render the image of ``plans(**options)[index]``; else as :meth:`render`.
+
+        Parameters
+        ----------
+        index : which of the plans
+        progress, options : as for :meth:`render`
+
+        Returns
+        -------
+        Film
+            As of :func:`render`.
+
+        Raises
+        ------
+        UsageError
+            There is no such plan.
+        """
+        begin = time.monotonic()
+
+        def report(done: int, total: int) -> None:
+            if progress is not None:
+                progress(Progress(done, total, time.monotonic() - begin))
+
+        film = self._core.render(_request(options), index, report if progress is not None else None)
+        for warning in film.statistics["warnings"]:
+            if warning not in self._told:
+                _log.warning("%s", warning_text(warning))
+        return film
+
+
+def render(
+    stage: Any,
+    *,
+    frame: float | Literal["default"] | None = None,
+    camera: str | None = None,
+    render_settings: str | None = None,
+    product: str | None = None,
+    width: int | None = None,
+    height: int | None = None,
+    samples: int | None = None,
+    integrator: str | None = None,
+    aovs: Sequence[str] | None = None,
+    wavelength: float | None = None,
+    band: tuple[float, float] | None = None,
+    dispersion_scale: float | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    crop: tuple[int, int, int, int] | None = None,
+    sample_range: tuple[int, int] | None = None,
+    purposes: Sequence[str] | None = None,
+    variants: Sequence[str] = (),
+    overrides: Mapping[str, Any] | Sequence[str] = (),
+    search_paths: Sequence[str | os.PathLike[str]] = (),
+    missing: str = "warn",
+    strict: bool = False,
+    progress: Callable[[Progress], object] | None = None,
+) -> _core.Film:
+    """Render a USD stage.
+
+    What is left at None, the stage's render settings decide. Warnings go to the logger ``abbe`` and stand in the film's
+    statistics.
+
+    Parameters
+    ----------
+    stage : path of a .usd, .usda, .usdc or .usdz file, or a ``pxr.Usd.Stage``, which is not changed
+    frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
+    camera : path of a Camera, or the name of the first such
+    render_settings : path of a RenderSettings prim
+    product : path of a RenderProduct; needed where the stage has several
+    width, height : pixels, >= 1; one alone keeps the aspect
+    samples : samples per pixel, >= 1
+    integrator : a name of :func:`integrators`
+    aovs : names of AOVs or aliases of them (``abbe aovs`` lists them); the stage's RenderVars if None
+    wavelength : reference wavelength, nm
+    band : ends of the wavelength band of footprints, nm
+    dispersion_scale : multiplies all dispersion: 0 none, 1 physical
+    seed : same seed, same bits, on any number of threads
+    threads : all of the machine's if None
+    crop : x0, y0, x1, y1 in pixels, half-open, y down
+    sample_range : begin and end, half-open: a part that :func:`merge` joins with others
+    purposes, variants, overrides, search_paths, missing : as for :meth:`Scene.from_stage`
+    strict : what would be a warning about the request, or a missing camera, is an error
+    progress : called about ten times a second; ``print`` will do
+
+    Returns
+    -------
+    Film
+        ``film["dispersion"]`` is float32 with shape (height, width, 2), identifiers are uint32; top row first, read-only,
+        no copy. ``film.valid(name)`` tells where there is a value; ``film.write("out.exr")`` writes everything.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    StageError
+        The stage cannot be read or used; the message begins with the prim path.
+    UsageError
+        An argument is not understood or contradicts the stage.
+    KeyboardInterrupt
+        Ctrl-C; the finished part is the exception's attribute ``film``.
+    """
+    scene = Scene.from_stage(
+        stage,
+        frame=frame,
+        camera=camera,
+        render_settings=render_settings,
+        product=product,
+        purposes=purposes,
+        variants=variants,
+        overrides=overrides,
+        search_paths=search_paths,
+        missing=missing,
+        strict=strict,
+    )
+    # The bridge has chosen camera and product already.
+    return scene.render(
+        progress=progress,
+        width=width,
+        height=height,
+        samples=samples,
+        integrator=integrator,
+        aovs=aovs,
+        wavelength=wavelength,
+        band=band,
+        dispersion_scale=dispersion_scale,
+        seed=seed,
+        threads=threads,
+        crop=crop,
+        sample_range=sample_range,
+        strict=strict,
+    )
+
+
+def merge(inputs: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str]) -> None:
+    """Join crops and aligned sample ranges of one render into one EXR file.
+
+    Parameters
+    ----------
+    inputs : EXR files that abbe wrote, in any order
+    out : where to write; complete or not at all
+
+    Raises
+    ------
+    AbbeError
+        The files are not parts of one render, or cannot be read or written.
+    """
+    _core.merge([Path(path) for path in inputs], Path(out))
+
+
+def integrators() -> list[dict[str, Any]]:
+    """Return the integrators that can be chosen.
+
+    Returns
+    -------
+    list of dict
+        Each with ``name``, ``summary`` and the names of the ``aovs`` that it offers.
+    """
+    return _core.integrators()

@@ -1,0 +1,150 @@
+//! An instance made ready: transforms both ways, and how large the numbers are that they round.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use super::start::UNIT_ROUNDOFF;
+use super::tree::Bounds;
+use super::{Instance, Ray, Shape};
+
+/// Relative deviation from a similarity that rounding alone explains: a few products of matrices.
+const SIMILARITY: f64 = 64.0 * f64::EPSILON;
+/// Rounding of a box on its way through a transform, in units of 2^-53 times what was added up.
+const BOX_ERRORS: f64 = 32.0;
+
+/// A shape in render space.
+#[derive(Debug)]
+pub(super) struct Placed {
+    pub(super) shape: Arc<Shape>,
+    /// Render space from object space.
+    pub(super) linear: DMat3,
+    pub(super) translation: DVec3,
+    pub(super) inverse: DMat3,
+    /// Scale factor, if the transform keeps angles.
+    pub(super) similarity: Option<f64>,
+    norm: f64,
+    inverse_norm: f64,
+}
+
+/// A ray in object space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ObjectRay {
+    pub(super) origin: DVec3,
+    /// Unit vector.
+    pub(super) direction: DVec3,
+    /// Object-space length of a unit of render space along the ray.
+    pub(super) stretch: f64,
+}
+
+impl Placed {
+    pub(super) fn new(instance: &Instance, origin: DVec3) -> Self {
+        let DAffine3 { matrix3: linear, translation } = instance.world_from_object;
+        let linear = DMat3::from(linear);
+        let inverse = inverse(linear);
+        Self {
+            shape: Arc::clone(&instance.shape),
+            linear,
+            translation: translation - origin,
+            inverse,
+            similarity: similarity(linear),
+            norm: norm(linear),
+            inverse_norm: norm(inverse),
+        }
+    }
+
+    /// How many times a transform there and back enlarges rounding errors; ≥ 1.
+    pub(super) fn condition(&self) -> f64 {
+        (self.norm * self.inverse_norm).max(1.0)
+    }
+
+    /// Bounds in render space, outward by the rounding of the transforms; `None` for a shape without extent.
+    pub(super) fn bounds(&self) -> Option<Bounds> {
+        let (center, half) = match &*self.shape {
+            Shape::Sphere(sphere) => {
+                // The extent of the ellipsoid L·S² along an axis is the length of that row of L.
+                let rows = self.linear.transpose();
+                let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+                (self.translation, half * sphere.radius())
+            }
+            Shape::Mesh(mesh) => {
+                let [min, max] = mesh.bounds()?;
+                let half = 0.5 * (max - min);
+                (self.point(0.5 * (min + max)), absolute(self.linear) * half)
+            }
+        };
+        let magnitude = self.reach_of(self.extent()) * self.condition();
+        let error = DVec3::splat(BOX_ERRORS * UNIT_ROUNDOFF * magnitude);
+        Some(Bounds { min: center - half - error, max: center + half + error })
+    }
+
+    /// Largest coordinate of the shape in object space.
+    fn extent(&self) -> f64 {
+        match &*self.shape {
+            Shape::Sphere(sphere) => sphere.radius(),
+            Shape::Mesh(mesh) => mesh.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element()),
+        }
+    }
+
+    /// |L||v| + |t| for coordinates up to `extent`.
+    fn reach_of(&self, extent: f64) -> f64 {
+        self.norm * extent + self.translation.abs().max_element()
+    }
+
+    /// |L||v| + |t| at a primitive: what rounding a point of it in render space is relative to.
+    pub(super) fn reach(&self, primitive: u32) -> f64 {
+        let extent = match &*self.shape {
+            Shape::Sphere(sphere) => sphere.radius(),
+            Shape::Mesh(mesh) => mesh.corners(primitive).into_iter().map(|p| p.abs().max_element()).fold(0.0, f64::max),
+        };
+        self.reach_of(extent)
+    }
+
+    /// The size of the numbers rounded on the way of a ray's start to object space (`start.rs`). `magnitude` is |p| + reach
+    /// in render space.
+    pub(super) fn start_magnitude(&self, magnitude: f64, ray: &ObjectRay) -> f64 {
+        let there = magnitude + self.translation.abs().max_element() + self.norm * ray.origin.abs().max_element();
+        self.inverse_norm * there
+    }
+
+    pub(super) fn ray(&self, ray: &Ray) -> ObjectRay {
+        let direction = self.inverse * ray.direction;
+        let stretch = direction.length();
+        let origin = self.inverse * (ray.origin - self.translation);
+        ObjectRay { origin, direction: direction / stretch, stretch }
+    }
+
+    pub(super) fn point(&self, p: DVec3) -> DVec3 {
+        self.linear * p + self.translation
+    }
+
+    /// A normal or another covector in render space; outward stays outward under mirrored transforms.
+    pub(super) fn covector(&self, n: DVec3) -> DVec3 {
+        self.inverse.transpose() * n
+    }
+}
+
+/// The inverse, by way of a power of two so that determinants of tiny and huge transforms do not under- or overflow.
+fn inverse(m: DMat3) -> DMat3 {
+    let (_, exponent) = libm::frexp(absolute(m).to_cols_array().into_iter().fold(0.0, f64::max));
+    let scale = libm::ldexp(1.0, (-exponent).clamp(-1022, 1022));
+    (m * scale).inverse() * scale
+}
+
+/// Largest row sum of absolute values: the norm that belongs to the largest coordinate.
+fn norm(m: DMat3) -> f64 {
+    (absolute(m) * DVec3::ONE).max_element()
+}
+
+fn absolute(m: DMat3) -> DMat3 {
+    DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs())
+}
+
+/// The scale factor of a transform that keeps angles: LᵀL = s² I up to rounding.
+fn similarity(m: DMat3) -> Option<f64> {
+    let gram = m.transpose() * m;
+    let mean = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;
+    let rest = absolute(gram - DMat3::from_diagonal(DVec3::splat(mean)));
+    let off = rest.to_cols_array().into_iter().fold(0.0, f64::max);
+    (off <= SIMILARITY * mean).then(|| mean.sqrt())
+}

@@ -1,0 +1,88 @@
+//! The surface around a hit, in render space: point, normals, curvature (MATH.md 2.4).
+
+use glam::{DMat3, DVec3};
+
+use super::mesh::Mesh;
+use super::placed::Placed;
+use super::sphere::Sphere;
+use super::{Hit, Ray, Shape};
+use crate::ray::{Curvature, LocalSurface, NormalField};
+
+/// Below this share of the corner normals an interpolated one is nothing but their f32 rounding: sixteen of its steps.
+const VANISHING: f64 = 16.0 / 16_777_216.0;
+
+impl Placed {
+    pub(super) fn local_surface(&self, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
+        match &*self.shape {
+            Shape::Mesh(mesh) => self.facet(mesh, hit),
+            Shape::Sphere(sphere) => self.ellipsoid(*sphere, ray, hit),
+        }
+    }
+
+    /// The point is the combination of corners, which lies in the plane to rounding however far the ray came.
+    fn facet(&self, mesh: &Mesh, hit: &Hit) -> (DVec3, LocalSurface) {
+        let corners = mesh.corners(hit.primitive);
+        let [a, b, c] = corners.map(|p| self.point(p));
+        // Edges from object space: there they are exact, while corners far from render space's zero are rounded.
+        let (e1, e2) = (self.linear * (corners[1] - corners[0]), self.linear * (corners[2] - corners[0]));
+        let [v, w] = hit.barycentric;
+        let point = (1.0 - v - w) * a + v * b + w * c;
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let n_g = self.covector(normal).normalize();
+        let flat = LocalSurface { n_g, n_s: n_g, curvature: Curvature::Plane, field: NormalField::Flat };
+        let surface = mesh.normals(hit.primitive).and_then(|normals| {
+            let [s0, s1, s2] = normals.map(|n| self.covector(n));
+            let (d1, d2) = (s1 - s0, s2 - s0);
+            let vector = s0 + v * d1 + w * d2;
+            let largest = s0.length().max(s1.length()).max(s2.length());
+            if vector.length() <= VANISHING * largest || vector.dot(n_g) <= 0.0 {
+                return None;
+            }
+            let n_s = vector.normalize();
+            if d1 == DVec3::ZERO && d2 == DVec3::ZERO {
+                return Some(LocalSurface { n_s, ..flat });
+            }
+            let m = e1.cross(e2);
+            // ∇β1 and ∇β2, so that β1(q − a) = ∇β1·(q − a).
+            let (g1, g2) = (e2.cross(m) / m.length_squared(), m.cross(e1) / m.length_squared());
+            let gradient = outer(d1, g1) + outer(d2, g2);
+            Some(LocalSurface { n_s, field: NormalField::Linear { vector, gradient }, ..flat })
+        });
+        (point, surface.unwrap_or(flat))
+    }
+
+    fn ellipsoid(&self, sphere: Sphere, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
+        let object = self.ray(ray);
+        let p = sphere.project(object.origin + hit.distance * object.stretch * object.direction);
+        let point = self.point(p);
+        let n_g = self.covector(p).normalize();
+        let surface = match self.similarity {
+            Some(scale) => {
+                let inv_radius = 1.0 / (scale * sphere.radius());
+                LocalSurface {
+                    n_g,
+                    n_s: n_g,
+                    curvature: Curvature::Sphere { inv_radius },
+                    field: NormalField::Sphere { inv_radius },
+                }
+            }
+            None => {
+                // f = ½ (|L⁻¹(q − c)|² − r²): ∇f = L⁻ᵀ L⁻¹ (q − c), H = L⁻ᵀ L⁻¹.
+                let hessian = self.inverse.transpose() * self.inverse;
+                let vector = self.covector(p);
+                LocalSurface {
+                    n_g,
+                    n_s: n_g,
+                    curvature: Curvature::Quadric { hessian: hessian * vector.length().recip() },
+                    field: NormalField::Linear { vector, gradient: hessian },
+                }
+            }
+        };
+        (point, surface)
+    }
+}
+
+/// u vᵀ.
+fn outer(u: DVec3, v: DVec3) -> DMat3 {
+    DMat3::from_cols(u * v.x, u * v.y, u * v.z)
+}

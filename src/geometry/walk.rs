@@ -1,0 +1,145 @@
+//! A ray's way through a tree: conservative f32 slabs, children near to far, no allocation.
+//!
+//! The slab test must never miss a box in which the f64 shape test finds a hit. In the units of the boxes (all
+//! coordinates ≤ 1 in size) the errors are:
+//!
+//! * The origin. It is moved in f64 to where the ray enters the bounds of everything, so it is ≤ 1 in size before it is
+//!   rounded. The move errs by a few 2^-53 (|o| + 1), as does the shape test, which works with the origin as given: 2^-49
+//!   (|o| + 1) bounds both, times the caller's `spread` where the shape test has its own space. The padded origin is
+//!   rounded up for the near planes of positive directions and far planes of negative ones, down for the others.
+//! * The direction. Components below 2^-64 are replaced by ±2^-64, so that 1/d is finite and 0·∞ cannot arise; over a
+//!   distance of 4, more than the diagonal, that moves the ray by 2^-62, which the padding of 2^-40 covers.
+//! * The distances. 1/d, the difference and the product err by 2^-24 relatively, together (1 + 2^-24)^3: multiplying far
+//!   distances by 1 + 2^-21 covers both sides of the comparison (Ize 2013, "Robust BVH ray traversal", JCGT 2(2)).
+//!   The relative error cannot change a sign, and distances below 0 are behind the start.
+
+use glam::{DVec3, Vec4};
+
+use super::tree::{Node, STACK, Tree, round_down, round_up};
+
+const SMALLEST_DIRECTION: f64 = 1.0 / 18_446_744_073_709_551_616.0;
+const PADDING: f64 = 1.0 / 1_099_511_627_776.0;
+const RELATIVE_PADDING: f64 = 1.0 / 562_949_953_421_312.0;
+const FAR_FACTOR: f64 = 1.0 + 1.0 / 2_097_152.0;
+
+/// What waits on the stack: a node (`count` 0) or a leaf, and where the ray enters it.
+#[derive(Clone, Copy)]
+struct Waiting {
+    near: f32,
+    first: u32,
+    count: u32,
+}
+
+/// The ray in the units of the boxes.
+struct Slabs {
+    /// Whether the direction is negative, per axis.
+    negative: [usize; 3],
+    inverse: [Vec4; 3],
+    near_origin: [Vec4; 3],
+    far_origin: [Vec4; 3],
+}
+
+impl Tree {
+    /// Calls `visit` with every primitive whose box the ray passes between the distances `start` and the limit, which
+    /// `visit` returns anew each time; near boxes first.
+    ///
+    /// `spread` ≥ 1 says how many times larger the rounding errors of the caller's own test are than those of a test in
+    /// the space of the boxes.
+    pub(super) fn walk(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        start: f64,
+        limit: f64,
+        spread: f64,
+        mut visit: impl FnMut(u32, f64) -> f64,
+    ) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let scale = self.scale;
+        let origin = origin * scale;
+        let padding = PADDING + RELATIVE_PADDING * spread * (origin.abs().max_element() + 1.0);
+        let direction = DVec3::from_array(
+            direction.to_array().map(|d| if d.abs() < SMALLEST_DIRECTION { SMALLEST_DIRECTION.copysign(d) } else { d }),
+        );
+        let inverse = direction.recip();
+        let to_min = (self.bounds[0] - padding - origin) * inverse;
+        let to_max = (self.bounds[1] + padding - origin) * inverse;
+        let enter = to_min.min(to_max).max_element().max(start * scale);
+        let exit = to_min.max(to_max).min_element();
+        let mut limit = limit;
+        if !(enter <= exit * FAR_FACTOR + padding && enter <= limit * scale + padding) {
+            return;
+        }
+        let moved = origin + direction * enter;
+        let (low, high) = (round_down(moved - padding), round_up(moved + padding));
+        let mut slabs = Slabs {
+            negative: [0; 3],
+            inverse: [Vec4::ZERO; 3],
+            near_origin: [Vec4::ZERO; 3],
+            far_origin: [Vec4::ZERO; 3],
+        };
+        for axis in 0..3 {
+            let negative = inverse[axis] < 0.0;
+            slabs.negative[axis] = usize::from(negative);
+            slabs.inverse[axis] = Vec4::splat(inverse[axis] as f32);
+            let (near, far) = if negative { (low, high) } else { (high, low) };
+            slabs.near_origin[axis] = Vec4::splat(near[axis]);
+            slabs.far_origin[axis] = Vec4::splat(far[axis]);
+        }
+        // Distances from the moved origin, rounded up.
+        let reach = |limit: f64| round_up(DVec3::splat((limit * scale - enter) * FAR_FACTOR + padding)).x;
+        let mut farthest = reach(limit);
+
+        let mut stack = [Waiting { near: 0.0, first: 0, count: 0 }; STACK];
+        let mut len = 1;
+        while len > 0 {
+            len -= 1;
+            let item = stack[len];
+            if item.near > farthest {
+                continue;
+            }
+            if item.count > 0 {
+                let first = item.first as usize;
+                for &primitive in &self.order[first..first + item.count as usize] {
+                    limit = visit(primitive, limit);
+                }
+                farthest = reach(limit);
+                continue;
+            }
+            let node = &self.nodes[item.first as usize];
+            let (near, mut lanes) = slabs.entries(node, farthest);
+            // Insertion sort of at most four, farthest deepest on the stack.
+            let base = len;
+            while lanes != 0 {
+                let lane = (lanes.trailing_zeros() & 3) as usize;
+                lanes &= lanes - 1;
+                let new = Waiting { near: near[lane], first: node.first[lane], count: node.count[lane] };
+                let mut at = len;
+                while at > base && stack[at - 1].near < new.near {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = new;
+                len += 1;
+            }
+        }
+    }
+}
+
+impl Slabs {
+    /// Where the ray enters the children, and a bit for each that it passes before `farthest`.
+    #[inline(always)]
+    fn entries(&self, node: &Node, farthest: f32) -> ([f32; 4], u32) {
+        let plane = |axis: usize, far: usize, origin: &[Vec4; 3]| {
+            (node.bounds[(self.negative[axis] ^ far) & 1][axis] - origin[axis]) * self.inverse[axis]
+        };
+        let near = plane(0, 0, &self.near_origin)
+            .max(plane(1, 0, &self.near_origin))
+            .max(plane(2, 0, &self.near_origin).max(Vec4::ZERO));
+        let far = plane(0, 1, &self.far_origin).min(plane(1, 1, &self.far_origin)).min(plane(2, 1, &self.far_origin));
+        let passed = near.cmple((far * FAR_FACTOR as f32).min(Vec4::splat(farthest)));
+        (near.to_array(), passed.bitmask())
+    }
+}

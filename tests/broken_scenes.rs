@@ -1,0 +1,225 @@
+//! Bad input gives an error that names the place and the remedy: nothing panics, nothing hangs.
+
+mod support;
+
+use abbe::error::Error;
+use abbe::integrator::Registry;
+use abbe::render::{Request, plan};
+use abbe::scene::Scene;
+use abbe::scene::description::{Array, Description, Element, Group, Placement, Shape, Target};
+use abbe::scene::file;
+use glam::DMat4;
+use support::{Stagehand, ball, request};
+
+fn error(description: Description) -> Error {
+    match Scene::build(description) {
+        Ok(_) => panic!("the scene was accepted"),
+        Err(error) => error,
+    }
+}
+
+fn assert_says(error: &Error, place: &str, words: &str) {
+    let text = error.to_string();
+    assert!(text.starts_with(place), "'{text}' does not begin with '{place}'");
+    assert!(text.contains(words), "'{text}' does not say '{words}'");
+    assert!(!text.contains('\n'), "'{text}' is more than one line");
+}
+
+fn with_mesh(points: &[[f32; 3]], faces: &[&[i32]]) -> Description {
+    let mut s = ball();
+    s.mesh("/World/Mesh", points, faces, DMat4::IDENTITY, None);
+    s.description()
+}
+
+const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+#[test]
+fn broken_topology_names_the_mesh() {
+    assert_says(&error(with_mesh(&TRIANGLE, &[&[0, 1, 3]])), "/World/Mesh", "3");
+    assert_says(&error(with_mesh(&TRIANGLE, &[&[0, 1, -1]])), "/World/Mesh", "-1");
+    let mut nan = TRIANGLE;
+    nan[1][2] = f32::NAN;
+    assert_says(&error(with_mesh(&nan, &[&[0, 1, 2]])), "/World/Mesh", "finite");
+    let mut wrong_sum = with_mesh(&TRIANGLE, &[&[0, 1, 2]]);
+    wrong_sum.arrays.insert("shape2.counts".into(), Array::from_vec(Element::I32, 1, vec![4i32]));
+    assert_says(&error(wrong_sum), "/World/Mesh", "");
+}
+
+#[test]
+fn arrays_of_the_wrong_kind_are_refused() {
+    let mut missing = with_mesh(&TRIANGLE, &[&[0, 1, 2]]);
+    missing.arrays.remove("shape2.points");
+    assert_says(&error(missing), "/World/Mesh", "missing");
+    let mut wrong = with_mesh(&TRIANGLE, &[&[0, 1, 2]]);
+    wrong.arrays.insert("shape2.points".into(), Array::from_vec(Element::I32, 3, vec![0i32; 9]));
+    assert_says(&error(wrong), "/World/Mesh", "F32");
+    let mut lying = with_mesh(&TRIANGLE, &[&[0, 1, 2]]);
+    lying.arrays.get_mut("shape2.points").unwrap().shape = vec![usize::MAX / 2, 3];
+    assert_says(&error(lying), "/World/Mesh", "shape");
+}
+
+fn nested(groups: Vec<Group>) -> Description {
+    let mut description = ball().description();
+    description.document.groups.extend(groups);
+    description.document.groups[0].items.push(placement("/World/Nested", Target::Group(1)));
+    description
+}
+
+fn placement(path: &str, target: Target) -> Placement {
+    Placement {
+        path: path.into(),
+        target,
+        transform: None,
+        instance: None,
+        material: None,
+        subset_materials: vec![],
+        double_sided: false,
+    }
+}
+
+fn group(path: &str, items: Vec<Placement>) -> Group {
+    Group { path: path.into(), items }
+}
+
+#[test]
+fn cyclic_instances_are_named() {
+    let cycle = nested(vec![
+        group("/A", vec![placement("/A/b", Target::Group(2))]),
+        group("/B", vec![placement("/B/a", Target::Group(1))]),
+    ]);
+    assert_says(&error(cycle), "/B/a", "cycle");
+}
+
+#[test]
+fn an_explosion_of_instances_is_refused_before_it_happens() {
+    let mut groups: Vec<Group> = (0..40)
+        .map(|i| {
+            group(&format!("/G{i}"), (0..4).map(|k| placement(&format!("/G{i}/{k}"), Target::Group(i + 2))).collect())
+        })
+        .collect();
+    groups.push(group("/Leaf", vec![placement("/Leaf/s", Target::Shape(0))]));
+    assert_says(&error(nested(groups)), "/", "unroll");
+}
+
+#[test]
+fn deep_nesting_does_not_overflow_the_stack() {
+    let depth = 200_000;
+    let mut groups: Vec<Group> =
+        (0..depth).map(|i| group("/deep", vec![placement("/deep/i", Target::Group(i + 2))])).collect();
+    groups.push(group("/Leaf", vec![placement("/Leaf/s", Target::Shape(0))]));
+    let scene = Scene::build(nested(groups)).unwrap();
+    assert_eq!(scene.objects.len(), 3);
+}
+
+#[test]
+fn indices_out_of_range_are_refused() {
+    for target in [Target::Shape(99), Target::Group(99)] {
+        let mut description = ball().description();
+        description.document.groups[0].items.push(placement("/World/Lost", target));
+        assert_says(&error(description), "/World/Lost", "99");
+    }
+    let mut description = ball().description();
+    description.document.groups[0].items[0].material = Some(99);
+    assert_says(&error(description), "/World/Wall", "99");
+    let mut description = ball().description();
+    description.document.root = 5;
+    assert_says(&error(description), "test.usda", "5");
+}
+
+#[test]
+fn transforms_are_checked() {
+    let mut description = ball().description();
+    description.document.groups[0].items[0].transform = Some([f64::NAN; 16]);
+    assert_says(&error(description), "/World/Wall", "finite");
+    // Scaled to nothing is how animators hide things: left out, and said so.
+    let mut s = ball();
+    s.sphere("/World/Flat", 1.0, DMat4::from_scale(glam::DVec3::new(1.0, 0.0, 1.0)), None);
+    let scene = s.build();
+    assert_eq!(scene.objects.len(), 2);
+    assert!(
+        scene.diagnostics().warnings().iter().any(|w| w.kind == "singular-transform" && w.places == ["/World/Flat"])
+    );
+}
+
+#[test]
+fn a_sphere_without_a_size_is_refused() {
+    for radius in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let mut description = ball().description();
+        if let Shape::Sphere { radius: r, .. } = &mut description.document.shapes[1] {
+            *r = radius;
+        }
+        assert_says(&error(description), "/World/Ball.radius", "positive");
+    }
+}
+
+#[test]
+fn open_glass_is_warned_of() {
+    let mut s = Stagehand::new();
+    let glass = s.glass("/World/Glass", support::BK7);
+    s.wall(0.0, 1.0, Some(glass));
+    s.camera(glam::DVec3::Z, glam::DVec3::ZERO);
+    let scene = s.build();
+    let warning = scene.diagnostics().warnings().iter().find(|w| w.kind == "open-glass-mesh").expect("a warning");
+    assert_eq!(warning.places, ["/World/Wall"]);
+}
+
+#[test]
+fn requests_are_checked() {
+    let scene = ball().build();
+    let says = |request: Request, place: &str, words: &str| {
+        let error = plan(&scene, &request, &Registry::default()).expect_err("the request was accepted");
+        assert_says(&error, place, words);
+        assert_eq!(error.exit_code(), 2, "{error}");
+    };
+    says(request(0, 10, &["depth"]), "--width", "0");
+    says(request(10, 10, &["depht"]), "--aov depht", "abbe aovs");
+    says(request(10, 10, &["color"]), "--aov color", "light transport");
+    says(Request { integrator: Some("path".into()), ..Request::default() }, "integrator 'path'", "differentials");
+    says(Request { camera: Some("/No".into()), ..Request::default() }, "--camera /No", "/World/Camera");
+    says(Request { product: Some("/No".into()), ..Request::default() }, "--product /No", "none");
+    says(Request { wavelength: Some(0.55), ..Request::default() }, "--wavelength", "micrometres");
+    says(Request { band: Some([700.0, 400.0]), ..Request::default() }, "--band", "LO:HI");
+    says(Request { samples: Some(0), ..Request::default() }, "--samples", "1 to");
+    says(
+        Request { samples: Some(12), sample_range: Some([2, 6]), ..Request::default() },
+        "--sample-range 2:6",
+        "aligned",
+    );
+    says(Request { crop: Some([5, 5, 5, 9]), ..Request::default() }, "--crop", "no pixel");
+    says(Request { dispersion_scale: Some(f64::NAN), ..Request::default() }, "--dispersion-scale", "0 to 1000");
+}
+
+#[test]
+fn an_image_too_large_for_memory_is_refused() {
+    let scene = ball().build();
+    let request = request(1 << 17, 1 << 17, &["position", "normal", "uv", "refracted_position"]);
+    let plan = plan(&scene, &request, &Registry::default()).unwrap().remove(0);
+    let rendered = abbe::render::render(&scene, &plan, &Registry::default(), &abbe::render::Control::none());
+    assert_says(&rendered.expect_err("rendered?"), "--width", "crops");
+}
+
+#[test]
+fn hostile_scene_files_get_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.safetensors");
+    file::write(&path, &ball().description()).unwrap();
+    let good = std::fs::read(&path).unwrap();
+    assert!(file::read(&path, false).is_ok() && file::read(&path, true).is_ok());
+    // Cut anywhere, and with any byte of the head changed: an error or a scene, never a panic.
+    for cut in (0..good.len()).step_by(97) {
+        std::fs::write(&path, &good[..cut]).unwrap();
+        assert!(file::read(&path, false).is_err(), "cut at {cut}");
+    }
+    for at in (0..good.len().min(4096)).step_by(13) {
+        for value in [0u8, 0xff, b'9', b'"'] {
+            let mut bad = good.clone();
+            bad[at] = value;
+            std::fs::write(&path, &bad).unwrap();
+            if let Ok(description) = file::read(&path, false) {
+                let _ = Scene::build(description);
+            }
+        }
+    }
+    let missing = file::read(&folder.path().join("no.safetensors"), false).expect_err("read what is not there");
+    assert!(missing.to_string().contains("no.safetensors"), "{missing}");
+}
