@@ -192,7 +192,8 @@ def test_glass_meshes_are_closed_and_face_outwards(name: str, count: int) -> Non
     for mesh in meshes:
         faces = faces_of(mesh)
         edges = [edge for face in faces for edge in zip(face, face[1:] + face[:1], strict=True)]
-        assert len(set(edges)) == len(edges) and all((b, a) in set(edges) for a, b in edges)
+        directed = set(edges)
+        assert len(directed) == len(edges) and all((b, a) in directed for a, b in edges)
         points = np.asarray(mesh.GetPointsAttr().Get(), dtype=np.float64)
         assert len(points) - len(edges) // 2 + len(faces) == 2
         volume = sum(

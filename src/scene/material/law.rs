@@ -353,10 +353,8 @@ fn formula(values: &Values<'_>, diagnostics: &mut Diagnostics) -> Result<Dispers
 
 /// The range that was authored for the law: it must hold the reference wavelength.
 fn check_range(values: &Values<'_>, diagnostics: &mut Diagnostics) -> Result<()> {
-    if let Some(token) = values.text(OUT_OF_RANGE)? {
-        if !matches!(token, "clamp" | "error" | "extrapolate") {
-            return values.refuse(OUT_OF_RANGE, "author clamp, error or extrapolate");
-        }
+    if !matches!(values.text(OUT_OF_RANGE)?, None | Some("clamp" | "error" | "extrapolate")) {
+        return values.refuse(OUT_OF_RANGE, "author clamp, error or extrapolate");
     }
     let Some(range) = values.doubles(VALID_RANGE, diagnostics)? else { return Ok(()) };
     let [from, to] = range[..] else { return values.refuse(VALID_RANGE, "author two wavelengths in nm") };
