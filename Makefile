@@ -2,7 +2,7 @@
 # .venv/ and the cargo target folder are reused, so a second run does only what changed.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python lint lint-rust lint-python fmt bench stress wheel clean
+.PHONY: help build demo test test-rust test-python lint lint-rust lint-python fmt bench stress wheel clean
 
 # The oldest interpreter that is there: the wheel is built against 3.11 and serves every later one.
 PYTHON ?= $(firstword $(foreach p,python3.11 python3.12 python3.13 python3.14 python3,$(if $(shell $(p) --version 2>/dev/null),$(p))))
@@ -25,6 +25,7 @@ PACKAGE_SOURCES := pyproject.toml $(wildcard README.md LICENSE-*) \
   $(shell find python/abbe -type f \( -name '*.py' -o -name '*.pyi' -o -name 'py.typed' \) 2>/dev/null)
 
 help:
+	@echo 'make build   the package with everything, in .venv'
 	@echo 'make demo    build, install into .venv, render stages/prism.usda to $(OUT)/, check it, write a preview'
 	@echo 'make test    every test: Rust, documentation, Python, the wheel in an empty environment'
 	@echo 'make lint    formatting, clippy, rustdoc, ruff, mypy'
@@ -47,6 +48,8 @@ $(TOOLS): pyproject.toml | $(BIN)/python
 $(EXTENSION): $(CORE_SOURCES) pyproject.toml $(TOOLS)
 	$(BIN)/maturin develop --release --extras all
 	@touch $@
+
+build: $(EXTENSION)
 
 $(WHEEL): $(CORE_SOURCES) $(PACKAGE_SOURCES) $(TOOLS)
 	@rm -rf dist && mkdir -p dist

@@ -21,10 +21,12 @@
 //! | [`integrator`] | what is computed for a pixel; the plug-in point |
 //! | [`render`] | settings, plan, tiles, progress, statistics |
 //! | [`exr`] | multichannel files |
+//! | [`compare`] | ways to get a derivative, measured side by side |
 //!
 //! Imports go down this table only from its bottom up: a layer knows those above it (`tests/architecture.rs`).
 
 pub mod camera;
+pub mod compare;
 pub mod diagnostics;
 pub mod error;
 pub mod exr;

@@ -199,7 +199,7 @@ def mesh(
         lines += [f"normal3f[] normals = {tuples(normals, 6)} (", '    interpolation = "vertex"', ")"]
     lines.append(f"point3f[] points = {tuples(points, decimals)}")
     if uv:
-        lines += [f"texCoord2f[] primvars:st = {tuples(uv, 6)} (", '    interpolation = "vertex"', ")"]
+        lines += [f"texCoord2f[] primvars:st = {tuples(uv, 5)} (", '    interpolation = "vertex"', ")"]
     if subsets:
         lines.append('uniform token subsetFamily:materialBind:familyType = "nonOverlapping"')
     lines.append('uniform token subdivisionScheme = "none"')
@@ -239,7 +239,7 @@ def board(
         if is_second(i, j):
             second.append(len(faces))
         faces.append((corner, corner + 1, corner + 1 + len(columns), corner + len(columns)))
-    subsets = {looks[1]: (looks[1], second)}
+    subsets = {looks[1]: (looks[1], second)} if second else None
     return mesh(name, points, faces, looks[0], decimals=5, uv=uv, subsets=subsets, is_double_sided=True)
 
 
@@ -248,12 +248,40 @@ def steps(low: float, high: float, count: int) -> list[float]:
     return [low + (high - low) * i / count for i in range(count + 1)]
 
 
-def lines_between(low: float, high: float, pitch: float, thickness: float) -> list[float]:
-    """Edges of lines of a thickness about every multiple of the pitch: space, line, space, line … from low to high."""
-    edges = [low]
-    for k in range(math.ceil(low / pitch), math.floor(high / pitch) + 1):
-        edges += [x for x in (k * pitch - thickness / 2, k * pitch + thickness / 2) if low < x < high]
-    return [*edges, high]
+def grid(
+    paper: str,
+    lines: str,
+    z: float,
+    ranges: tuple[tuple[float, float], tuple[float, float]],
+    pitch: float,
+    thickness: float,
+    looks: tuple[str, str],
+) -> list[list[str]]:
+    """Paper facing +z with thin rectangles before it, one about every multiple of the pitch.
+
+    The rectangles lie a hundredth of their thickness apart, so that no two surfaces coincide.
+    """
+    (left, right), (bottom, top) = ranges
+    sheet = board(paper, (0.0, 0.0, z), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), [left, right], [bottom, top], looks, never)
+    points: list[Vector] = []
+    for axis, (low, high) in enumerate(ranges):
+        layer = z + (axis + 1) * thickness / 100
+        for k in range(math.ceil(low / pitch), math.floor(high / pitch) + 1):
+            a, b = k * pitch - thickness / 2, k * pitch + thickness / 2
+            box = (
+                ((a, bottom), (b, bottom), (b, top), (a, top))
+                if axis == 0
+                else ((left, a), (right, a), (right, b), (left, b))
+            )
+            points += [(x, y, layer) for x, y in box]
+    uv = [((x - left) / (right - left), (y - bottom) / (top - bottom)) for x, y, _ in points]
+    faces = [(k, k + 1, k + 2, k + 3) for k in range(0, len(points), 4)]
+    return [sheet, mesh(lines, points, faces, looks[1], decimals=4, uv=uv, is_double_sided=True)]
+
+
+def never(i: int, j: int) -> bool:
+    """No rectangle."""
+    return False
 
 
 def chequered(i: int, j: int) -> bool:
@@ -352,7 +380,9 @@ def settings(name: str) -> list[str]:
 
 def stage(name: str, doc: str, meters_per_unit: str, looks: list[list[str]], prims: list[list[str]]) -> str:
     """The whole layer."""
-    world = block('def Xform "World"', joined([*prims, block('def Scope "Looks"', joined(looks))]), ['kind = "component"'])
+    world = block(
+        'def Xform "World"', joined([*prims, block('def Scope "Looks"', joined(looks))]), ['kind = "component"']
+    )
     head = [
         "#usda 1.0",
         "(",
@@ -401,7 +431,7 @@ def prism() -> str:
     target = add((0.0, 0.0, 0.0), out, 40.0)
     side = cross((0.0, 1.0, 0.0), add((0.0, 0.0, 0.0), out, -1.0))
     prims = [
-        camera(PRISM_EYE, (0.0, 0.0, 0.0), 110.0, (1.0, 1000.0)),
+        camera(PRISM_EYE, (0.0, 0.0, 0.0), 80.0, (1.0, 1000.0)),
         dome_light(0.3),
         rect_light("Key", (25.0, 40.0, 20.0), (20.0, 0.0, -15.0), 20.0, 20.0),
         mesh("Prism", points, faces, "SF11", decimals=6),
@@ -445,8 +475,9 @@ def prism() -> str:
         paint("Dark", (0.12, 0.12, 0.12)),
     ]
     doc = f"""A prism of SF11, 60 degrees, at minimum deviation ({math.degrees(deviation):.2f} degrees at the d line).
-    The left face shows the target that stands to the right, outside the picture. Look for: `dispersion` even over that
-    face, horizontal, a good pixel per nanometre-step of its stripes; total reflection in the right face."""
+    Its left face shows the target that stands to the right, outside the picture. Look for: `dispersion` horizontal and
+    even over that face, about a quarter of a pixel per nanometre, while it is 0 beside the prism; `dispersion_r` and
+    `dispersion_b` carry the stripes many pixels apart; total reflection in the right face."""
     return stage("prism", doc, "0.01", looks, prims)
 
 
@@ -481,7 +512,7 @@ def ball() -> str:
         ['prepend apiSchemas = ["MaterialBindingAPI"]'],
     )
     prims = [
-        camera((0.0, 5.0, 24.0), (0.0, 2.9, 0.0), 95.0, (1.0, 1000.0)),
+        camera((0.0, 5.0, 24.0), (0.0, 2.9, 0.0), 60.0, (1.0, 1000.0)),
         dome_light(0.3),
         rect_light("Key", (-14.0, 22.0, 12.0), (0.0, 0.0, 0.0), 10.0, 20.0),
         sphere,
@@ -521,12 +552,12 @@ def ball() -> str:
 # --- lens -------------------------------------------------------------------------------------------------------------
 
 # The cemented doublet, from the side of the distant conjugate; mm. The prescription published for Thorlabs AC254-100-A.
-LENS_RADII = (62.8, -45.7, -128.2)
+LENS_RADII = (62.75, -45.71, -128.23)
 LENS_THICKNESSES = (4.0, 2.5)
 LENS_GLASSES = ("N-BK7", "SF5")
 LENS_RIM, LENS_BEVEL = 12.7, 0.3
-# Rings of the disc; ring k has 6k points, so triangles are even and the rim has 96 sides.
-LENS_RINGS = 16
+# Rings of the disc; ring k has 6k points, so triangles are even and the rim has 84 sides.
+LENS_RINGS = 14
 LENS_OBJECT = 60.0
 
 
@@ -637,22 +668,13 @@ def lens() -> str:
     ring = mount(0.2, first + second - 0.2)
     target = -(first + second + LENS_OBJECT)
     prims = [
-        camera((0.0, 0.0, 250.0), (0.0, 0.0, 0.0), 200.0, (1.0, 10000.0)),
+        camera((0.0, 0.0, 250.0), (0.0, 0.0, 0.0), 140.0, (1.0, 10000.0)),
         dome_light(0.3),
         rect_light("Key", (-120.0, 160.0, 60.0), (0.0, 0.0, target), 80.0, 20.0),
         mesh("Crown", turned(crown[0]), crown[2], "NBK7", decimals=4, normals=turned(crown[1])),
         mesh("Flint", turned(flint[0]), flint[2], "SF5", decimals=4, normals=turned(flint[1])),
         mesh("Mount", turned(ring[0]), ring[1], "Black", decimals=4),
-        board(
-            "Target",
-            (0.0, 0.0, target),
-            (1.0, 0.0, 0.0),
-            (0.0, 1.0, 0.0),
-            lines_between(-61.0, 61.0, 4.0, 0.5),
-            lines_between(-27.0, 61.0, 4.0, 0.5),
-            ("White", "Ink"),
-            lambda i, j: i % 2 == 1 or j % 2 == 1,
-        ),
+        *grid("Paper", "Grid", target, ((-61.0, 61.0), (-27.0, 61.0)), 4.0, 0.5, ("White", "Ink")),
         board(
             "Floor",
             (0.0, -27.0, 0.0),
@@ -674,10 +696,11 @@ def lens() -> str:
         paint("Dark", (0.12, 0.12, 0.12)),
     ]
     radii = ", ".join(f"{r:g}" for r in LENS_RADII)
-    doc = f"""A cemented achromat of N-BK7 and SF5, f = 100 mm (radii {radii} mm, thicknesses {first:g} and {second:g} mm,
-    as published for Thorlabs AC254-100-A), as a magnifier over a grid of 4 mm. Look for: `dispersion` near zero over most
-    of the lens, since red and blue focus together; `dispersion2` is what is left, the secondary spectrum. Both elements
-    have the cemented surface, point for point; their priorities decide. Scale 0 on one glass shows what it corrects."""
+    doc = f"""A cemented achromat of N-BK7 and SF5, f = 100 mm (radii {radii} mm, thicknesses
+    {first:g} and {second:g} mm, as published for Thorlabs AC254-100-A), as a magnifier over a grid of 4 mm. Look for:
+    `dispersion` near zero over most of the lens, since red and blue focus together; `dispersion2`, the secondary
+    spectrum, is what is left. Both elements have the cemented surface, point for point, and priorities that decide.
+    abbe:dispersion:scale = 0 on SF5 shows what it corrects."""
     return stage("lens", doc, "0.001", looks, prims)
 
 
@@ -710,8 +733,9 @@ def brilliant() -> list[tuple[str, Plane]]:
     """The facets of a round brilliant of girdle radius 1 with a pointed culet: 57 and the girdle. The axis is z.
 
     Bezels and pavilion mains slope as given and touch the girdle at multiples of 45 degrees. Everything else follows:
-    the table's corners lie on the bezels at its width; the stars' tips between the bezels, part of the way to the girdle;
-    upper halves pass through a star's tip and two hills of the girdle; lower halves end part of the way to the culet.
+    the table's corners lie on the bezels at its width; the stars' tips lie between the bezels, part of the way to the
+    girdle; upper halves pass through a star's tip and two hills of the girdle; lower halves end part of the way to the
+    culet.
     """
     crown, pavilion = math.radians(GEM_CROWN_ANGLE), math.radians(GEM_PAVILION_ANGLE)
     girdle, half_step = GEM_GIRDLE, math.cos(math.radians(22.5))
@@ -746,8 +770,8 @@ def brilliant() -> list[tuple[str, Plane]]:
 def polyhedron(planes: Sequence[Plane]) -> tuple[list[Vector], list[Face]]:
     """The convex body that lies behind all planes: its corners, and one polygon a plane, wound to face outwards.
 
-    By clipping a large square of each plane with all the others. Corners nearer than `weld` are one: facets that meet in
-    a point by construction do so up to rounding, some 1e-15 of the girdle's radius, and no edge is shorter than 1e-3.
+    By clipping a large square of each plane with all the others. Corners nearer than `weld` are one: facets that meet
+    in a point by construction do so up to rounding, some 1e-15 of the girdle's radius; no edge is shorter than 1e-3.
     """
     weld = 1e-9
     points: list[Vector] = []
@@ -788,7 +812,7 @@ def clipped(polygon: list[Vector], normal: Vector, limit: float, weld: float) ->
 
 
 def tent(radius: float, bands: int, sectors: int) -> tuple[list[Vector], list[Face], list[tuple[int, int]]]:
-    """A dome of panels over the origin that faces inwards, from the ground to the pole: points, faces, (band, sector)."""
+    """A dome of panels over the origin, facing inwards: points, faces, and the (band, sector) of each."""
     points: list[Vector] = []
     for band in range(bands):
         elevation = math.pi / 2 * band / bands
@@ -851,10 +875,11 @@ def gem() -> str:
         paint("Red", (0.6, 0.05, 0.05)),
         paint("Blue", (0.05, 0.1, 0.6)),
     ]
-    doc = f"""A diamond in round brilliant cut, 6.5 mm, 57 facets and a girdle of {GEM_GIRDLE_SIDES}: crown {GEM_CROWN_ANGLE:g} degrees,
-    pavilion {GEM_PAVILION_ANGLE:g} degrees, table {100 * GEM_TABLE:g} %, floating over a dark floor in a tent of panels. Look for: fire.
-    After two or more total reflections `dispersion_footprint` and `dispersion` differ from facet to facet by orders of
-    magnitude; `total_reflections` draws the facets of the pavilion, `footprint_half_width` tells where the first order ends."""
+    doc = f"""A diamond in round brilliant cut, 6.5 mm, 57 facets and a girdle of {GEM_GIRDLE_SIDES}: crown
+    {GEM_CROWN_ANGLE:g} degrees, pavilion {GEM_PAVILION_ANGLE:g} degrees, table {100 * GEM_TABLE:g} %;
+    it floats over a dark floor in a tent of panels. Look for: fire. After two or more total reflections `dispersion`
+    and `dispersion_footprint` differ from facet to facet by orders of magnitude; `total_reflections` draws the facets
+    of the pavilion, and `footprint_half_width` tells where the first order ends."""
     return stage("gem", doc, "0.001", looks, prims)
 
 

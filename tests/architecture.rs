@@ -15,6 +15,7 @@ const LAYERS: &[&[&str]] = &[
     &["film"],
     &["integrator"],
     &["render", "exr"],
+    &["compare"],
 ];
 
 fn layer(module: &str) -> usize {

@@ -551,3 +551,27 @@ fn everything_in_front_of_the_camera_is_framed_right() {
     assert!(integers(&image.film, "prim_id").iter().all(|&id| id == 1));
     assert!(floats(&image.film, "normal").0.chunks(3).all(|n| n == [0.0, 0.0, 1.0]));
 }
+
+#[test]
+fn analytic_columns_beat_every_difference_and_predictions_improve_with_order() {
+    let scene = ball().build();
+    let plan = the_plan(&scene, &request(48, 32, &["dispersion"]));
+    let comparison = abbe::compare::compare(&scene, &plan, 1).unwrap();
+    assert!(comparison.chains > 100);
+    let error = |name: &str, step: Option<f64>| {
+        comparison.methods.iter().find(|m| m.name == name && m.step_nm == step).unwrap().error.median
+    };
+    let analytic = error("analytic f64", None);
+    assert!(analytic <= 1e-9, "{analytic:e}");
+    assert!(error("analytic f32", None) <= 1e-4);
+    for method in comparison.methods.iter().filter(|m| m.name.contains("difference")) {
+        assert!(method.error.median >= analytic, "{method:?}");
+    }
+    // First order errs by h, central differences by h²: a tenth of the step.
+    let ratio = |name| error(name, Some(10.0)) / error(name, Some(1.0));
+    assert!((8.0..12.0).contains(&ratio("forward difference")), "{}", ratio("forward difference"));
+    assert!((80.0..120.0).contains(&ratio("central difference")), "{}", ratio("central difference"));
+    for pair in comparison.predictions.chunks(2) {
+        assert!(pair[1].error.median < pair[0].error.median, "{pair:?}");
+    }
+}

@@ -5,9 +5,9 @@
 >>> film["dispersion"].shape
 (540, 960, 2)
 
-Wavelengths are in nanometres, lengths in stage units, pixel vectors +x right and +y up while array rows run down. USD, OpenImageIO
-and Pillow are imported when they are needed; ``pip install 'abbe[all]'`` brings them. Importing this package makes its USD
-schemas known to a USD that is there.
+Wavelengths are in nanometres, lengths in stage units, pixel vectors +x right and +y up while array rows run down. USD,
+OpenImageIO and Pillow are imported when they are needed; ``pip install 'abbe[all]'`` brings them. Importing this package
+makes its USD schemas known to a USD that is there.
 """
 
 from __future__ import annotations

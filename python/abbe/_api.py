@@ -395,8 +395,8 @@ def render(
     Returns
     -------
     Film
-        ``film["dispersion"]`` is float32 with shape (height, width, 2), identifiers are uint32, top row first, read-only and
-        without a copy. ``film.valid(name)`` tells where there is a value; ``film.write("out.exr")`` writes everything.
+        ``film["dispersion"]`` is float32 with shape (height, width, 2), identifiers are uint32; top row first, read-only,
+        no copy. ``film.valid(name)`` tells where there is a value; ``film.write("out.exr")`` writes everything.
 
     Raises
     ------

@@ -1,6 +1,7 @@
 """The USD plug-in folder in this package: where it is, and making it known to a USD that is there.
 
-Reading a stage never needs it: the bridge reads attributes by name. Authoring with ``prim.ApplyAPI("AbbeDispersionAPI")`` does.
+Reading a stage never needs it: the bridge reads attributes by name. Authoring with ``prim.ApplyAPI("AbbeDispersionAPI")``
+does.
 """
 
 from __future__ import annotations

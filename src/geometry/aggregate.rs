@@ -4,9 +4,9 @@ use std::cmp::Ordering;
 
 use glam::DVec3;
 
-use super::mesh::MeshHit;
+use super::mesh::{Mesh, MeshHit};
 use super::placed::{ObjectRay, Placed};
-use super::start::{Start, behind};
+use super::start::{Met, Relation, Start, behind, relation};
 use super::tree::Tree;
 use super::{Departures, Hit, Instance, Ray, Shape};
 use crate::ray::LocalSurface;
@@ -113,9 +113,15 @@ impl Aggregate {
             let object = placed.ray(ray);
             match &*placed.shape {
                 Shape::Sphere(_) => placed.intersect(ray, instance, None, &mut nearest),
-                Shape::Mesh(mesh) => mesh.every_crossing(object.origin, object.direction, |hit| {
-                    nearest.offer(object.hit(instance, &hit));
-                }),
+                Shape::Mesh(mesh) => {
+                    let mut sides = Sides::new(f64::INFINITY);
+                    mesh.every_crossing(object.origin, object.direction, |hit| {
+                        sides.offer(object.hit(instance, &hit));
+                    });
+                    if let Some(hit) = sides.first(mesh, ray) {
+                        nearest.offer(hit);
+                    }
+                }
             }
         }
         nearest.hit
@@ -130,15 +136,61 @@ struct Nearest {
 
 impl Nearest {
     fn offer(&mut self, hit: Hit) {
-        let closer = self.hit.is_none_or(|best| {
-            let order = hit.distance.total_cmp(&best.distance);
-            order.then((hit.instance, hit.primitive).cmp(&(best.instance, best.primitive))) == Ordering::Less
-        });
-        if closer {
+        if self.hit.is_none_or(|best| is_before(&hit, &best)) {
             self.limit = hit.distance;
             self.hit = Some(hit);
         }
     }
+}
+
+/// Nearest entering and nearest leaving hit of one mesh.
+///
+/// Where a ray just touches an edge or a vertex it enters and leaves at one point, and rounding decides which of the two
+/// distances is smaller. Geometry knows better: whatever is met second reaches beyond the plane of what is met first.
+struct Sides {
+    hits: [Option<Hit>; 2],
+    limit: f64,
+}
+
+/// Half the digits: hits further apart are in order beyond doubt.
+const DOUBTFUL: f64 = 1.0 / 67_108_864.0;
+
+impl Sides {
+    fn new(limit: f64) -> Self {
+        Self { hits: [None; 2], limit }
+    }
+
+    /// Takes a hit and returns the distance of the nearest.
+    fn offer(&mut self, hit: Hit) -> f64 {
+        let best = &mut self.hits[usize::from(hit.leaving)];
+        if best.is_none_or(|best| is_before(&hit, &best)) {
+            *best = Some(hit);
+        }
+        self.limit = self.limit.min(hit.distance);
+        self.limit
+    }
+
+    fn first(&self, mesh: &Mesh, ray: &Ray) -> Option<Hit> {
+        let [entering, leaving] = self.hits;
+        let (Some(entering), Some(leaving)) = (entering, leaving) else { return entering.or(leaving) };
+        let (first, second) = if is_before(&entering, &leaving) { (entering, leaving) } else { (leaving, entering) };
+        let size = first.distance + ray.origin.abs().max_element();
+        if second.distance - first.distance > DOUBTFUL * size {
+            return Some(first);
+        }
+        // After the first the ray is on its outward side if it left there.
+        let corners = |hit: &Hit| mesh.corners(hit.primitive);
+        match relation(corners(&second), corners(&first), first.leaving) {
+            Relation::Behind => Some(Hit { distance: first.distance, ..second }),
+            _ => Some(first),
+        }
+    }
+}
+
+/// The order of hits: by distance, then by (instance, primitive).
+fn is_before(a: &Hit, b: &Hit) -> bool {
+    let order = a.distance.total_cmp(&b.distance);
+    order.then((a.instance, a.primitive).cmp(&(b.instance, b.primitive))) == Ordering::Less
 }
 
 impl ObjectRay {
@@ -166,11 +218,13 @@ impl Placed {
         });
         match &*self.shape {
             Shape::Mesh(mesh) => {
-                let limit = nearest.limit * object.stretch;
-                mesh.walk(object.origin, object.direction, start.as_ref(), limit, |hit| {
-                    nearest.offer(object.hit(instance, &hit));
-                    nearest.limit * object.stretch
+                let mut sides = Sides::new(nearest.limit);
+                mesh.walk(object.origin, object.direction, start.as_ref(), sides.limit * object.stretch, |hit| {
+                    sides.offer(object.hit(instance, &hit)) * object.stretch
                 });
+                if let Some(hit) = sides.first(mesh, ray) {
+                    nearest.offer(hit);
+                }
             }
             Shape::Sphere(sphere) => {
                 let roots = sphere.roots(object.origin, object.direction);
@@ -179,7 +233,7 @@ impl Placed {
                     None => roots.and_then(|roots| {
                         let leaving = roots[0] <= 0.0;
                         let distance = roots[usize::from(leaving)];
-                        (distance > 0.0).then_some((super::start::Met { distance, at_start: false }, leaving))
+                        (distance > 0.0).then_some((Met { distance, at_start: false }, leaving))
                     }),
                 };
                 if let Some((met, leaving)) = found {

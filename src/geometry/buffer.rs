@@ -21,6 +21,10 @@ impl<T: Pod> Buffer<T> {
         if std::mem::size_of::<T>() == 0 {
             return Err("elements without size cannot be viewed".to_owned());
         }
+        // An empty array may begin anywhere.
+        if bytes.is_empty() {
+            return Ok(Self { bytes, element: PhantomData });
+        }
         match bytemuck::try_cast_slice::<u8, T>(&bytes) {
             Ok(_) => Ok(Self { bytes, element: PhantomData }),
             Err(bytemuck::PodCastError::TargetAlignmentGreaterAndInputNotAligned) => Err(format!(
@@ -45,7 +49,7 @@ impl<T: Pod> Buffer<T> {
 
     /// The elements.
     pub fn as_slice(&self) -> &[T] {
-        bytemuck::cast_slice(&self.bytes)
+        if self.bytes.is_empty() { &[] } else { bytemuck::cast_slice(&self.bytes) }
     }
 }
 

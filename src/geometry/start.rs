@@ -65,8 +65,7 @@ impl Start<'_> {
         corners: [DVec3; 3],
         corners_of: impl Fn(u32) -> [DVec3; 3],
     ) -> Option<Met> {
-        let last = self.last();
-        if let Some((crossing, true)) = last
+        if let Some((crossing, true)) = self.last()
             && crossing.primitive == primitive
         {
             return None;
@@ -86,19 +85,38 @@ impl Start<'_> {
         if hit.distance < -behind(self.magnitude) {
             return None;
         }
-        let met = match last {
-            Some((crossing, _)) => {
-                crossing.outward != hit.leaving
-                    && (crossing.primitive == primitive
-                        || reaches(corners, corners_of(crossing.primitive), crossing.outward))
-            }
+        let met = self.crosses_now(primitive, hit.leaving, corners, &corners_of).unwrap_or_else(|| {
             // Not crossed when the ray arrived, so it is crossed now if the ray still goes the way it came.
-            None => {
-                let arriving = self.arrival.dot(normal);
-                if hit.leaving { arriving > 0.0 } else { arriving < 0.0 }
-            }
-        };
+            let arriving = self.arrival.dot(normal);
+            if hit.leaving { arriving > 0.0 } else { arriving < 0.0 }
+        });
         met.then_some(Met { distance: hit.distance.max(0.0), at_start: true })
+    }
+
+    /// Whether a triangle here is crossed in view of the crossings of its instance; `None` if there are none.
+    fn crosses_now(
+        &self,
+        primitive: u32,
+        leaving: bool,
+        corners: [DVec3; 3],
+        corners_of: impl Fn(u32) -> [DVec3; 3],
+    ) -> Option<bool> {
+        let mut met = None;
+        for crossing in self.crossings.iter().rev().filter(|c| c.instance == self.instance) {
+            // The ray is on this side of the sheet.
+            let other_side = crossing.outward != leaving;
+            if crossing.primitive == primitive {
+                return Some(other_side);
+            }
+            match relation(corners, corners_of(crossing.primitive), crossing.outward) {
+                Relation::SameSheet => return Some(other_side),
+                // A coincident sheet that faces the other way is another one: only its own crossings count.
+                Relation::FacingSheet => met = Some(true),
+                Relation::Beyond => return Some(other_side),
+                Relation::Behind => return Some(false),
+            }
+        }
+        met
     }
 
     /// Where a sphere is met: the distance, and whether the ray leaves there.
@@ -155,19 +173,39 @@ impl Start<'_> {
     }
 }
 
-/// Whether a triangle reaches into the half-space on one side of another, or lies in its plane.
-fn reaches(corners: [DVec3; 3], left: [DVec3; 3], outward: bool) -> bool {
-    let normal = (left[1] - left[0]).cross(left[2] - left[0]) * if outward { 1.0 } else { -1.0 };
+/// How a triangle lies to another one that a ray has left on one side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Relation {
+    /// In its plane, facing the same way.
+    SameSheet,
+    /// In its plane, facing the other way.
+    FacingSheet,
+    /// It reaches into the half-space in which the ray runs.
+    Beyond,
+    /// It does not: the ray cannot meet it.
+    Behind,
+}
+
+/// How the triangle `corners` lies to the triangle `left`, on whose outward or inward side the ray runs.
+pub(super) fn relation(corners: [DVec3; 3], left: [DVec3; 3], outward: bool) -> Relation {
+    let normal = (left[1] - left[0]).cross(left[2] - left[0]);
+    let side = if outward { normal } else { -normal };
     let mut coplanar = true;
     for corner in corners {
         let offset = corner - left[0];
-        let height = normal.dot(offset);
+        let height = side.dot(offset);
         // Shared corners are in the plane to the rounding of the product.
         let error = TRIANGLE_ERRORS * UNIT_ROUNDOFF * normal.length() * offset.length();
         if height > error {
-            return true;
+            return Relation::Beyond;
         }
         coplanar &= height >= -error;
     }
-    coplanar
+    if !coplanar {
+        Relation::Behind
+    } else if (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(normal) > 0.0 {
+        Relation::SameSheet
+    } else {
+        Relation::FacingSheet
+    }
 }

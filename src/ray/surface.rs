@@ -144,7 +144,9 @@ impl LinearNormals {
     #[inline(always)]
     pub(super) fn new(normal: DVec3, vector: DVec3, gradient: DMat3) -> Self {
         let length = vector.length();
-        Self { normal, length, inv_length: 1.0 / length, gradient }
+        // Vertex normals that cancel leave no S to normalise: the normal then is the given one and does not move.
+        let inv_length = if length > 0.0 { 1.0 / length } else { 0.0 };
+        Self { normal, length, inv_length, gradient }
     }
 }
 

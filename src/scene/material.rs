@@ -103,6 +103,7 @@ fn classify(
     }
     places.push(Values::new(&material.interface_abbe, &material.path, "inputs:"));
     let authored = Authored::new(places);
+    authored.warn_of_unread(diagnostics);
 
     let Some(shader) = &material.surface else {
         warn_of_idle_law(material, &authored, "it has no surface shader", diagnostics)?;
@@ -146,19 +147,16 @@ fn dispersion(
     scalar_ior: ScalarIor,
     diagnostics: &mut Diagnostics,
 ) -> Result<(Dispersion, String)> {
-    let at = |name: &str| {
-        let place = format!("<{}>.{name}", shader.path);
-        move |problem: String| Error::scene(place, problem)
-    };
     let glass = surface.glass(diagnostics)?;
+    let at_ior = |problem: String| Error::scene(&glass.ior_place, problem);
     let (law, source) = if let Some(stated) = authored.law(glass.ior, diagnostics)? {
         (stated.dispersion, stated.source)
     } else if let Some(abbe_number) = glass.abbe_number {
-        let law = Dispersion::from_abbe_number(glass.ior, abbe_number).map_err(at("inputs"))?;
+        let law = Dispersion::from_abbe_number(glass.ior, abbe_number).map_err(at_ior)?;
         (law, format!("{} of {}, n_d from {}", glass.abbe_source, shader.id, glass.ior_source))
     } else {
         let ScalarIor::Constant = scalar_ior;
-        let law = Dispersion::constant(glass.ior).map_err(at("inputs"))?;
+        let law = Dispersion::constant(glass.ior).map_err(at_ior)?;
         (law, format!("no dispersion is authored, {} of {}", glass.ior_source, shader.id))
     };
     let scale = authored.scale(diagnostics)?;

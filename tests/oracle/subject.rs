@@ -170,13 +170,19 @@ pub fn w_squared(scattering: &Scattering) -> f64 {
     scattering.w_squared
 }
 
+/// A distance that is zero but for rounding counts as zero: coincident surfaces are met one after the other.
+fn ahead(t: f64, p: DVec3, reach: f64) -> Option<f64> {
+    let rounding = 16.0 * f64::EPSILON * (p.length() + reach);
+    (t.is_finite() && t >= -rounding).then_some(t.max(0.0))
+}
+
 /// Distance, hit point and local surface where a line meets a surface.
 pub fn hit(surface: &Surface, root: Root, p: DVec3, d: DVec3) -> Option<(f64, DVec3, LocalSurface)> {
     match surface {
         Surface::Plane { point, normal } => {
             let n = normal.normalize();
-            let t = n.dot(*point - p) / n.dot(d);
-            (t.is_finite() && t >= 0.0).then(|| (t, p + t * d, flat(n)))
+            let t = ahead(n.dot(*point - p) / n.dot(d), p, point.length())?;
+            Some((t, p + t * d, flat(n)))
         }
         Surface::Sphere { center, radius, inward } => {
             let o = p - *center;
@@ -216,10 +222,7 @@ pub fn hit(surface: &Surface, root: Root, p: DVec3, d: DVec3) -> Option<(f64, DV
             let (e1, e2) = (*b - *a, *c - *a);
             let m = e1.cross(e2);
             let n = m.normalize();
-            let t = n.dot(*a - p) / n.dot(d);
-            if !(t.is_finite() && t >= 0.0) {
-                return None;
-            }
+            let t = ahead(n.dot(*a - p) / n.dot(d), p, a.length())?;
             let point = p + t * d;
             let local = match normals {
                 None => flat(n),
@@ -269,5 +272,5 @@ fn quadratic(speed: f64, o: DVec3, u: DVec3, radius: f64, root: Root) -> Option<
     let large = -b - if b < 0.0 { -s } else { s };
     let (low, high) = if large > 0.0 { (c / large, large) } else { (large, c / large) };
     let t = if root == Root::First { low } else { high } / speed;
-    (t.is_finite() && t >= 0.0).then_some(t)
+    ahead(t, o / speed, radius / speed)
 }

@@ -1,4 +1,4 @@
-"""The bridge over every stage of the shared assets: a valid description or a StageError, nothing else, and USD agrees."""
+"""The bridge over every stage of the shared assets: each gives a valid description, and USD agrees with it."""
 
 import os
 from pathlib import Path
@@ -9,10 +9,9 @@ from description_schema import validate
 
 pytest.importorskip("pxr.Usd", reason="the bridge needs usd-core")
 
-from pxr import Usd, UsdGeom, UsdShade
-
 from abbe.errors import StageError
 from abbe.usd import describe, list_cameras, list_settings
+from pxr import Usd, UsdGeom, UsdShade
 
 ROOT = Path(__file__).resolve().parents[2]
 EXTENSIONS = (".usd", ".usda", ".usdc", ".usdz")

@@ -12,10 +12,9 @@ from description_schema import validate
 
 pytest.importorskip("pxr.Usd", reason="the bridge needs usd-core")
 
-from pxr import Sdf, Usd, UsdGeom
-
 from abbe.errors import StageError, UsageError
 from abbe.usd import describe, list_cameras, list_settings
+from pxr import Sdf, Usd, UsdGeom
 
 STAGES = Path(__file__).parent / "stages"
 
@@ -165,7 +164,7 @@ def test_arrays_are_usds_own_memory_and_outlive_the_stage():
 def test_a_value_that_is_not_finite_is_an_error_with_its_place():
     with pytest.raises(StageError, match=r"^</S>\.radius = nan: "):
         describe(in_memory('def Sphere "S"\n{\n double radius = nan\n}\n'))
-    with pytest.raises(StageError, match="^</S>: its transform is not finite"):
+    with pytest.raises(StageError, match=r"^</S>: its transform is not finite"):
         text = 'double3 xformOp:translate = (inf, 0, 0)\n uniform token[] xformOpOrder = ["xformOp:translate"]'
         describe(in_memory(f'def Sphere "S"\n{{\n {text}\n}}\n'))
 
@@ -193,7 +192,7 @@ def test_purposes_and_frames_decide_what_is_shown():
     assert "/Guides/BackToRender" not in placements(read("selection.usda", purposes=["proxy"]))
     assert "/Guides/Guide" in placements(read("selection.usda", purposes=["render", "guide"]))
     assert "/Blinks" not in placements(read("selection.usda", frame=2))
-    with pytest.raises(UsageError, match="^purposes: 'beauty'"):
+    with pytest.raises(UsageError, match=r"^purposes: 'beauty'"):
         describe(STAGES / "selection.usda", purposes=["beauty"])
 
 
@@ -355,7 +354,7 @@ def test_without_a_camera_what_is_rendered_is_framed(up_axis):
     near, far = camera["clipping_range"]
     assert 0 < near < distance - 2 and distance + 2 < far
     assert camera["path"] == "" and len(warned(description, "framed-camera")) == 1
-    with pytest.raises(StageError, match="has no camera.*add a Camera prim"):
+    with pytest.raises(StageError, match=r"has no camera.*add a Camera prim"):
         describe(stage, strict=True)
 
 
@@ -482,7 +481,7 @@ def test_variants_are_selected_by_name_and_unknown_ones_refused():
         with pytest.raises(StageError, match=message):
             describe(STAGES / "variants.usda", variants=[text])
     for text in ("/World", "/World{shape}", "/World.x{a=b}", "{a=b}"):
-        with pytest.raises(UsageError, match="^variant"):
+        with pytest.raises(UsageError, match=r"^variant"):
             describe(STAGES / "variants.usda", variants=[text])
 
 
@@ -559,7 +558,7 @@ def test_what_does_not_compose_is_named_or_refused(capfd):
     assert capfd.readouterr().err == "", "USD's own warnings are ours to show"
     with pytest.raises(StageError, match=r"^</Layer>: .*not_here\.usda.*choose --missing warn"):
         describe(STAGES / "missing.usda", missing="error")
-    with pytest.raises(UsageError, match="^missing 'maybe'"):
+    with pytest.raises(UsageError, match=r"^missing 'maybe'"):
         describe(STAGES / "missing.usda", missing="maybe")
 
 
@@ -618,6 +617,39 @@ def test_a_folder_and_other_things_are_no_stages(tmp_path):
         describe("")
     with pytest.raises(UsageError, match="is not finite"):
         describe(STAGES / "render.usda", frame=float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("type_name", "name", "value"),
+    [
+        ("Camera", "focalLength", 'string focalLength = "long"'),
+        ("Camera", "fStop", "float2 fStop = (1, 2)"),
+        ("Camera", "focusDistance", "float focusDistance = inf"),
+        ("Camera", "clippingRange", "float clippingRange = 1"),
+        ("Camera", "clippingRange", "float2 clippingRange = (nan, 1)"),
+        ("Sphere", "radius", 'string radius = "wide"'),
+        ("RenderSettings", "resolution", 'string resolution = "HD"'),
+        ("RenderSettings", "dataWindowNDC", "float4 dataWindowNDC = (0, 0, inf, 1)"),
+        ("RenderSettings", "includedPurposes", "int includedPurposes = 3"),
+        ("RenderSettings", "materialBindingPurposes", "int[] materialBindingPurposes = [3]"),
+    ],
+)
+def test_values_that_decide_the_picture_are_never_guessed(type_name, name, value):
+    with pytest.raises(StageError, match=rf"^</X>\.{name} = .*: is no"):
+        describe(in_memory(f'def {type_name} "X"\n{{\n {value}\n}}\n'))
+
+
+def test_values_of_odd_types_elsewhere_do_not_stop_the_reading():
+    stage = in_memory(
+        'def Mesh "M"\n{\n int visibility = 3\n float purpose = 2\n int orientation = 1\n int subdivisionScheme = 0\n'
+        " point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]\n int[] faceVertexCounts = [3]\n"
+        ' int[] faceVertexIndices = [0, 1, 2]\n string holeIndices = "x"\n token primvars:st = "s"\n int normals = 1\n'
+        ' string doubleSided = ""\n}\n'
+        'def Camera "C"\n{\n int projection = 4\n}\n'
+        'def RenderProduct "P"\n{\n int productName = 3\n int productType = 3\n}\n'
+        'def RenderVar "V"\n{\n int sourceName = 3\n}\n'
+    )
+    validate((description := describe(stage, product="/P")).document, description.arrays)
 
 
 def test_odd_stage_metadata_is_repaired_with_a_warning():

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import pytest
-
 from abbe.usd import tokens
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -1,4 +1,4 @@
-"""The schema plug-in: found in both ways, exactly as documented, reproduced by its generator, never needed to open a file."""
+"""The schema plug-in: found in both ways, exactly as documented, reproduced by its generator."""
 
 import importlib.util
 import json

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from ..errors import StageError
 from . import tokens
 from ._pxr import Gf, Sdf, Usd, UsdGeom
-from .values import is_finite, matrix, place
+from .values import is_finite, matrix, place, read
 
 __all__ = ["all_cameras", "find_camera", "framed_camera", "read_camera"]
 
@@ -64,11 +66,12 @@ def read_camera(prim: Any, time: Any, transforms: Any) -> dict[str, Any]:
     camera = UsdGeom.Camera(prim)
 
     def number(attribute: Any, fallback: float) -> float:
-        value = attribute.Get(time)
-        value = float(value) if isinstance(value, (int, float)) else fallback
-        if not math.isfinite(value):
-            raise StageError(f"{place(prim)}.{attribute.GetName()} = {value}: is not finite: give it a number")
-        return value
+        value = read(prim, attribute.GetName(), time)
+        if value is None:
+            return fallback
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise StageError(f"{place(prim)}.{attribute.GetName()} = {value}: is no finite number: give it one")
+        return float(value)
 
     transform = matrix(transforms.GetLocalToWorldTransform(prim))
     if not is_finite(transform):
@@ -76,7 +79,7 @@ def read_camera(prim: Any, time: Any, transforms: Any) -> dict[str, Any]:
     result: dict[str, Any] = {
         "path": str(prim.GetPath()),
         "transform": transform,
-        "projection": str(camera.GetProjectionAttr().Get(time) or tokens.PERSPECTIVE),
+        "projection": str(read(prim, camera.GetProjectionAttr().GetName(), time) or tokens.PERSPECTIVE),
         "horizontal_aperture": number(camera.GetHorizontalApertureAttr(), _HORIZONTAL_APERTURE),
         "vertical_aperture": number(camera.GetVerticalApertureAttr(), _VERTICAL_APERTURE),
         "horizontal_aperture_offset": number(camera.GetHorizontalApertureOffsetAttr(), 0.0),
@@ -87,12 +90,14 @@ def read_camera(prim: Any, time: Any, transforms: Any) -> dict[str, Any]:
         "shutter_open": number(camera.GetShutterOpenAttr(), 0.0),
         "shutter_close": number(camera.GetShutterCloseAttr(), 0.0),
     }
-    clipping = camera.GetClippingRangeAttr().Get(time)
+    clipping = read(prim, camera.GetClippingRangeAttr().GetName(), time)
     if clipping is not None:
-        near, far = (float(value) for value in clipping)
-        # A far plane at infinity is none.
-        if math.isfinite(near) and not math.isnan(far):
-            result["clipping_range"] = [near, min(far, _FARTHEST)]
+        numbers = np.asarray(clipping)
+        if numbers.shape != (2,) or numbers.dtype.kind not in "fiu" or np.isnan(numbers).any() or np.isinf(numbers[0]):
+            name = camera.GetClippingRangeAttr().GetName()
+            raise StageError(f"{place(prim)}.{name} = {clipping}: is no range: give it a near and a far distance")
+        # An infinite far plane is as good as the farthest that the attribute can hold.
+        result["clipping_range"] = [float(numbers[0]), min(float(numbers[1]), _FARTHEST)]
     return result
 
 

@@ -7,6 +7,7 @@ What the arrays say is checked by the core; here only their types are, since USD
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,22 @@ import numpy as np
 from ..errors import StageError
 from . import tokens
 from ._pxr import Usd, UsdGeom
-from .description import ArrayTable, Diagnostics
+from .description import Array, ArrayTable, Diagnostics
 from .values import float_array, int_array, place, read
 
 __all__ = ["ShapeReader"]
 
 Bounds = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Lowest and highest corner in object space."""
+
+
+def _extent(points: Array) -> Bounds:
+    """Return lowest and highest corner; column by column, which NumPy does many times faster than ``axis=0``."""
+    x, y, z = points.T
+    return (
+        (float(x.min()), float(y.min()), float(z.min())),
+        (float(x.max()), float(y.max()), float(z.max())),
+    )
 
 
 class ShapeReader:
@@ -31,21 +41,20 @@ class ShapeReader:
         self._diagnostics = diagnostics
         self._table = ArrayTable()
         self._index_by_prim: dict[Any, int | None] = {}
-        self.shapes: list[dict[str, Any]] = []
         self.arrays = self._table.arrays
+        self.shapes: list[dict[str, Any]] = []
+        self.double_sided: list[bool] = []
+        """Per shape: ``doubleSided`` of its prim."""
+        self.subset_names: list[list[str]] = []
+        """Per shape: the prim names of its subsets, in order: the same under every instance."""
 
-    def sphere(self, prim: Any) -> int | None:
-        """Return the index of the shape of a ``Sphere`` prim."""
-        return self._shared(prim, self._read_sphere)
+    def sphere(self, prim: Any, source: Any) -> int | None:
+        """Return the index of the shape of a ``Sphere`` prim; prims with one ``source`` share it."""
+        return self._shared(prim, source, self._read_sphere)
 
-    def mesh(self, prim: Any) -> int | None:
+    def mesh(self, prim: Any, source: Any) -> int | None:
         """Return the index of the shape of a ``Mesh`` prim; None (with a warning) if it has nothing to render."""
-        return self._shared(prim, self._read_mesh)
-
-    def subset_names(self, shape: int) -> list[str]:
-        """Return the prim names of the subsets of a shape, in order: the same under every instance."""
-        mesh = self.shapes[shape].get("mesh")
-        return [] if mesh is None else [subset["path"].rpartition("/")[2] for subset in mesh["subsets"]]
+        return self._shared(prim, source, self._read_mesh)
 
     def bounds(self, shape: int) -> Bounds | None:
         """Return the extent of a shape in its object space; None if it has no finite point."""
@@ -54,22 +63,22 @@ class ShapeReader:
             radius = abs(sphere["radius"])
             return (-radius, -radius, -radius), (radius, radius, radius)
         points = self.arrays[self.shapes[shape]["mesh"]["points"]]
-        low, high = points.min(axis=0), points.max(axis=0)
-        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        bounds = _extent(points)
+        if not all(math.isfinite(value) for corner in bounds for value in corner):
             points = points[np.isfinite(points).all(axis=1)]
-            if not len(points):
-                return None
-            low, high = points.min(axis=0), points.max(axis=0)
-        return tuple(low.tolist()), tuple(high.tolist())
+            return _extent(points) if len(points) else None
+        return bounds
 
-    def _shared(self, prim: Any, read_shape: Any) -> int | None:
-        key = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
-        if key not in self._index_by_prim:
+    def _shared(self, prim: Any, source: Any, read_shape: Callable[[Any], dict[str, Any] | None]) -> int | None:
+        if source not in self._index_by_prim:
             shape = read_shape(prim)
-            self._index_by_prim[key] = None if shape is None else len(self.shapes)
+            self._index_by_prim[source] = None if shape is None else len(self.shapes)
             if shape is not None:
                 self.shapes.append(shape)
-        return self._index_by_prim[key]
+                self.double_sided.append(bool(read(prim, tokens.DOUBLE_SIDED, self._time)))
+                subsets = shape["mesh"]["subsets"] if "mesh" in shape else []
+                self.subset_names.append([subset["path"].rpartition("/")[2] for subset in subsets])
+        return self._index_by_prim[source]
 
     def _read_sphere(self, prim: Any) -> dict[str, Any] | None:
         radius = read(prim, tokens.RADIUS, self._time)

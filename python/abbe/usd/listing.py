@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import tokens
-from ._pxr import Usd, UsdGeom
+from ._pxr import UsdGeom
 from .cameras import all_cameras, read_camera
 from .description import Diagnostics
 from .reader import default_camera
-from .render import all_settings, find_settings, read_settings
+from .render import all_settings, find_settings, read_settings, token_list
 from .stage import OpenedStage, Overrides, open_stage, quiet_usd, source_name, stage_time
-from .values import read
 
 __all__ = ["CameraInfo", "ProductInfo", "SettingsInfo", "VarInfo", "cameras", "settings"]
 
@@ -155,12 +154,12 @@ def _settings_info(prim: Any, document: dict[str, Any], cameras_seen: list[str],
         for product in document["products"]
     )
     base = document["base"]
-    purposes = read(prim, tokens.INCLUDED_PURPOSES, Usd.TimeCode.Default())
+    purposes = token_list(prim, tokens.INCLUDED_PURPOSES)
     return SettingsInfo(
         path=base["path"],
         is_default=is_default,
         resolution=resolution_of(base),
         camera=camera_of(base),
-        purposes=tuple(str(p) for p in (tokens.DEFAULT_PURPOSES if purposes is None else purposes)),
+        purposes=tokens.DEFAULT_PURPOSES if purposes is None else tuple(purposes),
         products=products,
     )

@@ -10,16 +10,18 @@ import enum
 import itertools
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from ..errors import StageError, UsageError
 from . import tokens
-from ._pxr import Gf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+from ._pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 from .cameras import find_camera, framed_camera, read_camera
 from .description import Description, Diagnostics
 from .geometry import ShapeReader
 from .materials import MaterialReader
-from .render import find_settings, read_settings
+from .render import find_settings, read_settings, token_list
 from .stage import (
     OpenedStage,
     Overrides,
@@ -29,7 +31,6 @@ from .stage import (
     source_name,
     stage_metadata,
     stage_time,
-    usd_reason,
 )
 from .values import IDENTITY, is_finite, matrix, place, read
 
@@ -82,15 +83,30 @@ def _light_schemas() -> list[Any]:
     return [getattr(UsdLux, name) for name in names if hasattr(UsdLux, name)]
 
 
-class _State:
+class _Facts(NamedTuple):
+    """What a prim says of itself; the same for a prim of a prototype under every instance."""
+
+    kind: _Kind
+    invisible: bool
+    purpose: str | None
+    """None where none is authored."""
+
+
+class _State(NamedTuple):
     """What children inherit."""
 
-    __slots__ = ("instance", "purpose", "visible")
+    visible: bool
+    purpose: str | None
+    instance: str | None
+    """The outermost native instance."""
 
-    def __init__(self, visible: bool, purpose: str | None, instance: str | None) -> None:
-        self.visible = visible
-        self.purpose = purpose  # None: nothing authored so far
-        self.instance = instance
+
+class _Placed(NamedTuple):
+    """A placement on its way into the description."""
+
+    prim: Any
+    shape: int
+    item: dict[str, Any]
 
 
 class _Walk:
@@ -103,51 +119,66 @@ class _Walk:
         self.diagnostics = diagnostics
         self.transforms = UsdGeom.XformCache(time)
         self.shapes = ShapeReader(time, diagnostics)
-        self.placed: list[tuple[Any, dict[str, Any]]] = []
+        self.placed: list[_Placed] = []
         self.cameras: list[Any] = []
         self._kinds: dict[str, _Kind] = {}
+        self._facts_by_prim: dict[Any, _Facts] = {}
 
     def run(self) -> None:
         """Visit every prim that the stage defines, those inside native instances included."""
         states = [_State(True, None, None)]
         prims = iter(Usd.PrimRange(self.stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
         for prim in itertools.islice(prims, 1, None):
-            depth = prim.GetPath().pathElementCount
-            del states[depth:]
-            type_name = prim.GetTypeName()
-            kind = self._kinds.get(type_name)
-            if kind is None:
-                kind = self._kinds[type_name] = _classify(prim)
+            path = prim.GetPath()
+            del states[path.pathElementCount :]
+            parent = states[-1]
+            # Below an instance all is shared; the instance itself may differ from its prototype's root.
+            source = prim.GetPrimInPrototype() if parent.instance is not None else None
+            facts = self._facts_by_prim.get(source) if source else None
+            if facts is None:
+                facts = self._facts(prim)
+                if source:
+                    self._facts_by_prim[source] = facts
+            kind = facts.kind
             if kind is _Kind.LEAF:
                 prims.PruneChildren()
                 continue
-            state = self._state(prim, states[-1])
+            state = self._inherit(prim, facts, parent)
             states.append(state)
             if kind is _Kind.INSTANCER:
                 # Its prototypes usually stand below it and are not drawn where they stand.
                 prims.PruneChildren()
             if kind is not _Kind.PASS_THROUGH:
-                self._visit(prim, kind, state)
+                self._visit(prim, source or prim, str(path), kind, state)
             elif prim.IsModel():
                 self._check_draw_mode(prim, state)
 
-    def _state(self, prim: Any, parent: _State) -> _State:
-        visible = parent.visible
-        if visible:
-            attribute = prim.GetAttribute(tokens.VISIBILITY)
-            visible = not attribute or attribute.Get(self.time) != tokens.INVISIBLE
-        purpose = parent.purpose
+    def _facts(self, prim: Any) -> _Facts:
+        type_name = prim.GetTypeName()
+        kind = self._kinds.get(type_name)
+        if kind is None:
+            kind = self._kinds[type_name] = _classify(prim)
         attribute = prim.GetAttribute(tokens.PURPOSE)
-        if attribute and attribute.HasAuthoredValue():
-            purpose = str(attribute.Get() or tokens.DEFAULT)
-        instance = parent.instance
-        if instance is None and prim.IsInstance():
-            instance = str(prim.GetPath())
-        if visible is parent.visible and purpose is parent.purpose and instance is parent.instance:
-            return parent
-        return _State(visible, purpose, instance)
+        authored = bool(attribute) and attribute.HasAuthoredValue()
+        return _Facts(
+            kind,
+            read(prim, tokens.VISIBILITY, self.time) == tokens.INVISIBLE,
+            str(read(prim, tokens.PURPOSE, self.time) or tokens.DEFAULT) if authored else None,
+        )
 
-    def _visit(self, prim: Any, kind: _Kind, state: _State) -> None:
+    @staticmethod
+    def _inherit(prim: Any, facts: _Facts, parent: _State) -> _State:
+        enters_instance = parent.instance is None and prim.IsInstance()
+        if not facts.invisible and facts.purpose is None and not enters_instance:
+            return parent
+        return _State(
+            parent.visible and not facts.invisible,
+            parent.purpose if facts.purpose is None else facts.purpose,
+            str(prim.GetPath()) if enters_instance else parent.instance,
+        )
+
+    def _visit(self, prim: Any, source: Any, path: str, kind: _Kind, state: _State) -> None:
+        """Do with a prim what its kind asks for; ``source`` is what it shares with other instances, or itself."""
         if kind is _Kind.CAMERA:
             self.cameras.append(prim)
             return
@@ -162,9 +193,9 @@ class _Walk:
             self.diagnostics.skip(f"purpose {purpose}")
             return
         if kind is _Kind.MESH:
-            self._place(prim, self.shapes.mesh(prim), state)
+            self._place(prim, path, self.shapes.mesh(prim, source), state)
         elif kind is _Kind.SPHERE:
-            self._place(prim, self.shapes.sphere(prim), state)
+            self._place(prim, path, self.shapes.sphere(prim, source), state)
         elif kind is _Kind.SKELETAL:
             self.diagnostics.warn(
                 "unsupported-prim", place(prim), "skinning is not supported; meshes below are rendered as authored"
@@ -189,59 +220,62 @@ class _Walk:
                 f"draw mode '{mode}' is not supported; all of it is rendered",
             )
 
-    def _place(self, prim: Any, shape: int | None, state: _State) -> None:
+    def _place(self, prim: Any, path: str, shape: int | None, state: _State) -> None:
         if shape is None:
             return
-        placement: dict[str, Any] = {"path": str(prim.GetPath()), "target": {"shape": shape}}
+        item: dict[str, Any] = {"path": path, "target": {"shape": shape}}
         transform = matrix(self.transforms.GetLocalToWorldTransform(prim))
         if not is_finite(transform):
             raise StageError(f"{place(prim)}: its transform is not finite: correct its xformOps or its parents'")
         if transform != IDENTITY:
-            placement["transform"] = transform
+            item["transform"] = transform
         if state.instance is not None:
-            placement["instance"] = state.instance
-        if read(prim, tokens.DOUBLE_SIDED, self.time):
-            placement["double_sided"] = True
-        self.placed.append((prim, placement))
+            item["instance"] = state.instance
+        if self.shapes.double_sided[shape]:
+            item["double_sided"] = True
+        self.placed.append(_Placed(prim, shape, item))
 
     def bind(self, materials: MaterialReader) -> list[dict[str, Any]]:
         """Add materials to the placements and return them."""
         prims: list[Any] = []
-        for prim, placement in self.placed:
-            prims.append(prim)
-            prims.extend(prim.GetChild(name) for name in self.shapes.subset_names(placement["target"]["shape"]))
+        for placed in self.placed:
+            prims.append(placed.prim)
+            prims.extend(placed.prim.GetChild(name) for name in self.shapes.subset_names[placed.shape])
         bound = iter(materials.bound(prims))
-        for _, placement in self.placed:
+        for placed in self.placed:
             material = next(bound)
             if material is not None:
-                placement["material"] = material
-            names = self.shapes.subset_names(placement["target"]["shape"])
+                placed.item["material"] = material
+            names = self.shapes.subset_names[placed.shape]
             if names:
-                placement["subset_materials"] = [next(bound) for _ in names]
-        return [placement for _, placement in self.placed]
+                placed.item["subset_materials"] = [next(bound) for _ in names]
+        return [placed.item for placed in self.placed]
 
     def bounds(self) -> tuple[list[float], list[float]] | None:
         """Return the world box of everything placed, by the corners of object-space boxes; None if there is none."""
-        box = Gf.Range3d()
-        for _, placement in self.placed:
-            extent = self.shapes.bounds(placement["target"]["shape"])
-            if extent is None:
-                continue
-            world = Gf.Matrix4d(*placement.get("transform", IDENTITY))
-            box.UnionWith(
-                Gf.BBox3d(Gf.Range3d(Gf.Vec3d(*extent[0]), Gf.Vec3d(*extent[1])), world).ComputeAlignedRange()
-            )
-        return _finite_box(box)
+        corners: dict[int, Any] = {}
+        for shape in {placed.shape for placed in self.placed}:
+            extent = self.shapes.bounds(shape)
+            if extent is not None:
+                # Homogeneous rows, as USD multiplies them.
+                corners[shape] = np.array([(*corner, 1.0) for corner in itertools.product(*zip(*extent, strict=True))])
+        placed = [p for p in self.placed if p.shape in corners]
+        if not placed:
+            return None
+        matrices = np.array([p.item.get("transform", IDENTITY) for p in placed]).reshape(-1, 4, 4)
+        with np.errstate(over="ignore", invalid="ignore"):  # a box that is not finite is no box
+            world = np.matmul(np.array([corners[p.shape] for p in placed]), matrices).reshape(-1, 4)[:, :3]
+        return _finite_box(world.min(axis=0).tolist(), world.max(axis=0).tolist())
 
     def stage_bounds(self) -> tuple[list[float], list[float]] | None:
         """Return the world box of the stage as USD computes it, prims included that are not rendered."""
         cache = UsdGeom.BBoxCache(self.time, sorted(self.purposes), True)
-        return _finite_box(cache.ComputeWorldBound(self.stage.GetPseudoRoot()).ComputeAlignedRange())
+        box = cache.ComputeWorldBound(self.stage.GetPseudoRoot()).ComputeAlignedRange()
+        return None if box.IsEmpty() else _finite_box(list(box.GetMin()), list(box.GetMax()))
 
 
-def _finite_box(box: Any) -> tuple[list[float], list[float]] | None:
-    low, high = list(box.GetMin()), list(box.GetMax())
-    return None if box.IsEmpty() or not is_finite([*low, *high]) else (low, high)
+def _finite_box(low: list[float], high: list[float]) -> tuple[list[float], list[float]] | None:
+    return (low, high) if is_finite([*low, *high]) else None
 
 
 def read_stage(
@@ -267,11 +301,7 @@ def read_stage(
         opened = open_stage(
             stage_or_path, variants=variants, overrides=overrides, search_paths=search_paths, diagnostics=diagnostics
         )
-        try:
-            return _read(opened, diagnostics, frame, camera, render_settings, product, purposes, missing, strict)
-        except Tf.ErrorException as error:
-            # A call of USD that no one expects to fail: the stage is at fault, or we are; either way no traceback.
-            raise StageError(f"{opened.source}: USD cannot read it: {usd_reason(error)}: correct the file") from error
+        return _read(opened, diagnostics, frame, camera, render_settings, product, purposes, missing, strict)
 
 
 def _read(
@@ -334,9 +364,8 @@ def _read(
 def _purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[str]:
     """Return the purposes to render: those asked for, else the settings', else default and render; default always."""
     if wanted is None:
-        authored = read(settings, tokens.INCLUDED_PURPOSES, Usd.TimeCode.Default()) if settings is not None else None
-        wanted = tokens.DEFAULT_PURPOSES if authored is None else [str(purpose) for purpose in authored]
-        return frozenset([tokens.DEFAULT, *wanted])
+        authored = None if settings is None else token_list(settings, tokens.INCLUDED_PURPOSES)
+        return frozenset([tokens.DEFAULT, *(tokens.DEFAULT_PURPOSES if authored is None else authored)])
     if isinstance(wanted, str):
         wanted = wanted.replace(",", " ").split()
     for purpose in wanted:
@@ -347,12 +376,10 @@ def _purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[str]:
 
 def _binding_purpose(settings: Any) -> str:
     """Return the material purpose: the first of the settings' that is not the all-purpose one."""
-    authored = None
-    if settings is not None:
-        authored = read(settings, tokens.MATERIAL_BINDING_PURPOSES, Usd.TimeCode.Default())
+    authored = None if settings is None else token_list(settings, tokens.MATERIAL_BINDING_PURPOSES)
     if authored is None:
         return tokens.FULL_PURPOSE
-    return next((str(purpose) for purpose in authored if purpose), UsdShade.Tokens.allPurpose)
+    return next(filter(None, authored), str(UsdShade.Tokens.allPurpose))
 
 
 def default_camera(stage: Any, settings: Any, cameras: list[Any]) -> Any:

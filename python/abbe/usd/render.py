@@ -15,12 +15,12 @@ from typing import Any
 
 from ..errors import StageError
 from . import tokens
-from ._pxr import Sdf, UsdGeom, UsdRender
+from ._pxr import Sdf, Usd, UsdGeom, UsdRender
 from .description import Diagnostics
 from .materials import warn_unknown_names
 from .values import authored_namespace, place, plain, read
 
-__all__ = ["all_settings", "expand_frame_tokens", "find_settings", "read_settings"]
+__all__ = ["all_settings", "expand_frame_tokens", "find_settings", "read_settings", "token_list"]
 
 
 def all_settings(stage: Any) -> list[Any]:
@@ -54,6 +54,22 @@ def find_settings(stage: Any, wanted: str | None, source: str, diagnostics: Diag
                 "(--render-settings) or author the stage's renderSettingsPrimPath",
             )
     return found[0] if len(found) == 1 else None
+
+
+def token_list(settings: Any, name: str) -> list[str] | None:
+    """Return an attribute of tokens; None where there is no value.
+
+    Raises
+    ------
+    StageError
+        It holds something else.
+    """
+    value = plain(read(settings, name, Usd.TimeCode.Default()))
+    if value is None:
+        return None
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        raise StageError(f"{place(settings)}.{name} = {value}: is no list of tokens: correct the value")
+    return value
 
 
 def _typed(stage: Any, wanted: str, schema: Any, type_name: str, where: str) -> Any:

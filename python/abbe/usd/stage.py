@@ -16,7 +16,7 @@ from typing import Any
 
 from ..errors import StageError, UsageError
 from . import tokens
-from ._pxr import Ar, Pcp, Sdf, Usd, UsdUtils
+from ._pxr import Ar, Pcp, Sdf, Tf, Usd, UsdUtils
 from .description import Diagnostics
 from .values import place
 
@@ -29,7 +29,6 @@ __all__ = [
     "source_name",
     "stage_metadata",
     "stage_time",
-    "usd_reason",
 ]
 
 Overrides = Mapping[str, Any] | Sequence[str]
@@ -61,15 +60,24 @@ def quiet_usd(source: str, diagnostics: Diagnostics) -> Iterator[None]:
 
     Composition errors are reported by :func:`composition_warnings`, with prim paths; a crate file's age is not the
     user's concern.
+
+    Raises
+    ------
+    StageError
+        A call of USD failed that is not expected to: the stage is at fault.
     """
     delegate = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         yield
+    except Tf.ErrorException as error:
+        raise StageError(f"{source}: USD cannot read it: {_usd_reason(error)}: correct the file") from error
     finally:
         try:
-            for item in delegate.TakeUncoalescedDiagnostics():
-                if not any(name in item.sourceFunction for name in _REPORTED_ELSEWHERE):
-                    diagnostics.warn("usd", source, _commentary(item))
+            items = delegate.TakeUncoalescedDiagnostics()
+            new = [item for item in items if not any(name in item.sourceFunction for name in _REPORTED_ELSEWHERE)]
+            # Several threads compose a stage, so that the order says nothing.
+            for message in sorted(map(_commentary, new)):
+                diagnostics.warn("usd", source, message)
         finally:
             # The delegate listens until it is destroyed.
             del delegate
@@ -90,7 +98,7 @@ _ADDRESS = re.compile(r" <0x[0-9a-f]+>")
 _COMMENTARY = re.compile(r"at line \d+ in file \S+ : '(.*?)'\s*(?=\n|$)", re.DOTALL)
 
 
-def usd_reason(error: BaseException) -> str:
+def _usd_reason(error: BaseException) -> str:
     """Return the first reason in a Tf error, on one line and without USD's own source positions."""
     try:
         text = str(error)
@@ -171,7 +179,7 @@ def _root_layer(path: str, context: Any) -> Any:
         try:
             layer = Sdf.Layer.FindOrOpen(path)
         except RuntimeError as error:
-            raise StageError(f"{path}: cannot be read as USD: {usd_reason(error)}: export it again") from None
+            raise StageError(f"{path}: cannot be read as USD: {_usd_reason(error)}: export it again") from None
     if not layer:
         raise StageError(f"{path}: is not a USD file (.usda, .usdc, .usd, .usdz), or it cannot be read: check the file")
     return layer
@@ -181,7 +189,7 @@ def _compose(open_it: Any, source: str) -> Any:
     try:
         stage = open_it()
     except RuntimeError as error:
-        raise StageError(f"{source}: cannot be composed: {usd_reason(error)}: correct the file") from None
+        raise StageError(f"{source}: cannot be composed: {_usd_reason(error)}: correct the file") from None
     if not stage:
         raise StageError(f"{source}: cannot be composed: correct the file")
     return stage
@@ -415,11 +423,14 @@ def composition_warnings(opened: OpenedStage, missing: str, diagnostics: Diagnos
     StageError
         ``missing`` is ``"error"`` and a layer or prim that is referred to is not there.
     """
-    for error in _composition_errors(opened.stage):
-        site = getattr(error, "rootSite", None)
-        path = getattr(site, "path", None)
+
+    def described(error: Any) -> tuple[str, str, Any]:
+        path = getattr(getattr(error, "rootSite", None), "path", None)
         where = place(path) if path is not None and not path.isEmpty else opened.source
-        text = " ".join(str(error).split())
+        return where, " ".join(str(error).split()), error
+
+    # USD gives them in no order that two runs share.
+    for where, text, error in sorted(map(described, _composition_errors(opened.stage)), key=lambda found: found[:2]):
         kind = "missing-reference" if isinstance(error, _MISSING) else "composition-error"
         target = _ASSET.search(text)
         if kind == "missing-reference" and target and target[1].split(":SDF_FORMAT_ARGS")[0].endswith(".mtlx"):

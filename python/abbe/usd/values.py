@@ -154,14 +154,15 @@ def _array(value: Any, kinds: str) -> Array | None:
 _VT_MODULE = "pxr.Vt"
 
 
-def is_finite(values: Iterable[float]) -> bool:
+def is_finite(values: list[float]) -> bool:
     """Return whether every number is finite."""
-    return all(math.isfinite(value) for value in values)
+    # A finite sum has finite terms; that of finite terms may still overflow.
+    return math.isfinite(sum(values)) or all(math.isfinite(value) for value in values)
 
 
 def matrix(value: Any) -> list[float]:
     """Return a ``Gf.Matrix4d`` as 16 doubles, row by row."""
-    numbers: list[float] = np.asarray(value, dtype=np.float64).ravel().tolist()
+    numbers: list[float] = np.asarray(value).ravel().tolist()
     return numbers
 
 

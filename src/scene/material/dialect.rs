@@ -56,8 +56,10 @@ pub(super) enum Response {
 pub(super) struct Glass {
     /// n_d > 0, finite.
     pub(super) ior: f64,
-    /// Where `ior` comes from.
+    /// Where `ior` comes from, in words.
     pub(super) ior_source: String,
+    /// The input that `ior` comes from, for errors.
+    pub(super) ior_place: String,
     /// V_d > 0, if the shader states dispersion.
     pub(super) abbe_number: Option<f64>,
     /// Where the Abbe number comes from.
@@ -124,7 +126,7 @@ impl<'a> Surface<'a> {
             Some((number, source)) => (Some(number), source),
             None => (None, String::new()),
         };
-        Ok(Glass { ior, ior_source, abbe_number, abbe_source })
+        Ok(Glass { ior, ior_source, ior_place: self.values.place(ior_name), abbe_number, abbe_source })
     }
 
     /// Opacity under 0.5 is glass in the mode `transparent`, and a hole in the mode `presence` or under a threshold.

@@ -22,8 +22,27 @@ const OUT_OF_RANGE: &str = "abbe:dispersion:outOfRange";
 const SCALE: &str = "abbe:dispersion:scale";
 const PRIORITY: &str = "abbe:dielectricPriority";
 
-/// Declared by the schema, and not computed with.
-const UNREAD: &[&str] = &["abbe:extinction:table", "abbe:internalTransmittance:table"];
+/// Read here.
+const READ: &[&str] = &[
+    GLASS,
+    LAW,
+    ND,
+    VD,
+    CAUCHY,
+    SELLMEIER_B,
+    SELLMEIER_C,
+    FORMULA,
+    COEFFICIENTS,
+    TABLE,
+    VALID_RANGE,
+    OUT_OF_RANGE,
+    SCALE,
+    PRIORITY,
+];
+
+/// Declared by the schema, and not computed with: absorption and metals have no part in the specular chain.
+const UNREAD: &[&str] =
+    &["abbe:extinction:table", "abbe:internalTransmittance:table", "abbe:internalTransmittance:thickness"];
 
 /// The laws that can be stated, by precedence where several are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -145,14 +164,25 @@ impl<'a> Authored<'a> {
         };
         let dispersion = compile(form, values, shader_ior, diagnostics)?;
         check_range(values, diagnostics)?;
-        for name in UNREAD.iter().filter(|name| values.has(name)) {
-            diagnostics.warn(
-                "unread-attribute",
-                values.place(name),
-                "absorption is not computed by this version: the attribute has no effect",
-            );
+        let source = match form {
+            Form::Constant => values.place(LAW),
+            Form::AbbeNumber if !values.has(VD) => values.place(ND),
+            _ => values.place(attribute(form)),
+        };
+        Ok(Some(Stated { dispersion, source }))
+    }
+
+    /// Names every attribute that has no effect: not computed with yet, or misspelt.
+    pub(super) fn warn_of_unread(&self, diagnostics: &mut Diagnostics) {
+        for values in &self.places {
+            for name in values.names().filter(|name| !READ.contains(name)) {
+                let message = match UNREAD.contains(&name) {
+                    true => "absorption is not computed by this version: the attribute has no effect",
+                    false => "is no attribute of AbbeDispersionAPI and has no effect: is it misspelt?",
+                };
+                diagnostics.warn("unread-attribute", values.place(name), message);
+            }
         }
-        Ok(Some(Stated { dispersion, source: values.place(attribute(form)) }))
     }
 
     /// The artistic factor on n(λ) − n_d, 1 if not authored.

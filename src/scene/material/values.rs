@@ -28,9 +28,9 @@ impl<'a> Values<'a> {
         self.map.contains_key(name)
     }
 
-    /// Whether anything but the given names is authored.
-    pub(super) fn is_empty(&self) -> bool {
-        self.map.is_empty()
+    /// The names of everything authored.
+    pub(super) fn names(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        self.map.keys().map(String::as_str)
     }
 
     fn error(&self, name: &str, problem: impl AsRef<str>) -> Error {

@@ -1,0 +1,234 @@
+"""Options that several commands share: which stage, read how; what to render. Names of usdrecord are understood too."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable
+from typing import Any, Literal
+
+from .._api import Options, Scene
+from ..errors import UsageError
+from . import messages
+
+__all__ = ["add_quiet", "add_request", "add_stage", "numbers", "open_scene", "request", "stage_options"]
+
+SCENE_SUFFIX = ".safetensors"
+
+
+def numbers(
+    kind: Callable[[str], Any], count: int, form: str, separators: str = ","
+) -> Callable[[str], tuple[Any, ...]]:
+    """Return a parser of ``count`` numbers, for argparse.
+
+    Parameters
+    ----------
+    kind : int or float
+    count : how many are wanted
+    form : how they are written, for the error
+    separators : characters between them
+    """
+
+    def parse(text: str) -> tuple[Any, ...]:
+        parts = re.split(f"[{re.escape(separators)}]", text)
+        try:
+            values = tuple(kind(part) for part in parts)
+        except ValueError:
+            values = ()
+        if len(values) != count:
+            raise argparse.ArgumentTypeError(f"'{text}' is not of the form {form}")
+        return values
+
+    return parse
+
+
+def add_quiet(parser: argparse.ArgumentParser) -> None:
+    """Add ``--quiet``."""
+    parser.add_argument("--quiet", action="store_true", help="no progress and no warnings")
+
+
+def _names(text: str) -> list[str]:
+    return [name for name in re.split(r"[,\s]+", text) if name]
+
+
+def add_stage(parser: argparse.ArgumentParser, time: bool = True) -> None:
+    """Add the stage and how it is read.
+
+    Parameters
+    ----------
+    parser : to add to
+    time : offer ``--frame`` and ``--defaultTime``; commands with ``--frames`` have their own
+    """
+    parser.add_argument(
+        "stage", metavar="STAGE", help="a .usd, .usda, .usdc or .usdz file, or an exported .safetensors scene"
+    )
+    group = parser.add_argument_group("the stage")
+    if time:
+        group.add_argument("--frame", type=float, metavar="T", help="time code; the stage's start unless given")
+        group.add_argument(
+            "--defaultTime",
+            "-d",
+            dest="default_time",
+            action="store_true",
+            help="read default values, not time samples",
+        )
+    group.add_argument(
+        "--purposes",
+        type=_names,
+        action="extend",
+        metavar="P[,P...]",
+        help="of default, render, proxy, guide; default and render unless the settings say otherwise",
+    )
+    group.add_argument(
+        "--variant",
+        action="append",
+        default=[],
+        metavar="PRIM{SET=NAME}",
+        help="select a variant, such as /World/Ball{material=glass}",
+    )
+    group.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="overrides",
+        metavar="PRIM.ATTR=VALUE",
+        help="set an attribute, such as /World/Glass.inputs:ior=1.6",
+    )
+    group.add_argument(
+        "--search-path",
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="where to look for assets after the stage's own folders",
+    )
+    group.add_argument(
+        "--missing",
+        choices=("warn", "error"),
+        default="warn",
+        help="what a missing layer or reference is; warn unless given",
+    )
+
+
+def add_request(parser: argparse.ArgumentParser) -> None:
+    """Add what to render."""
+    group = parser.add_argument_group("the image (what is not given, the stage's render settings decide)")
+    group.add_argument("--camera", "-cam", metavar="P", help="path of a camera, or its name")
+    group.add_argument(
+        "--render-settings", "--renderSettingsPrimPath", "-rs", metavar="P", help="path of a RenderSettings prim"
+    )
+    group.add_argument("--product", metavar="P", help="path of the one RenderProduct to render")
+    group.add_argument(
+        "--width", "--imageWidth", "-w", type=int, metavar="N", help="pixels; alone, it keeps the aspect"
+    )
+    group.add_argument("--height", type=int, metavar="N", help="pixels; alone, it keeps the aspect")
+    group.add_argument("--samples", type=int, metavar="N", help="samples per pixel")
+    group.add_argument("--integrator", metavar="NAME", help="what computes a pixel; `abbe aovs` lists them")
+    group.add_argument(
+        "--aov", action="append", metavar="NAME", help="an AOV to render, instead of the stage's; repeat for more"
+    )
+    group.add_argument("--wavelength", type=float, metavar="NM", help="reference wavelength; 587.5618 nm")
+    group.add_argument(
+        "--band",
+        type=numbers(float, 2, "LO:HI", ":"),
+        metavar="LO:HI",
+        help="wavelength band of footprints; 400:700 nm",
+    )
+    group.add_argument(
+        "--dispersion-scale", type=float, metavar="S", help="multiplies all dispersion: 0 none, 1 physical"
+    )
+    group.add_argument("--seed", type=int, metavar="N", help="same seed, same bits")
+    group.add_argument(
+        "--threads", type=int, metavar="N", help="all of the machine's unless given; never changes a bit"
+    )
+    group.add_argument(
+        "--crop",
+        type=numbers(int, 4, "X0,Y0,X1,Y1"),
+        metavar="X0,Y0,X1,Y1",
+        help="pixels to render, half-open, y down (--crop=-8,0,… for negative ones)",
+    )
+    group.add_argument(
+        "--sample-range",
+        type=numbers(int, 2, "A:B", ":"),
+        metavar="A:B",
+        help="samples to render, half-open; `abbe merge` joins parts",
+    )
+    group.add_argument("--strict", action="store_true", help="what would be warned of in the request is an error")
+
+
+def request(args: argparse.Namespace, from_stage: bool) -> Options:
+    """Return what ``args`` ask the core for; of a stage, the bridge has chosen camera and product already."""
+    options = Options(
+        width=args.width,
+        height=args.height,
+        samples=args.samples,
+        integrator=args.integrator,
+        aovs=args.aov,
+        wavelength=args.wavelength,
+        band=args.band,
+        dispersion_scale=args.dispersion_scale,
+        seed=args.seed,
+        threads=args.threads,
+        crop=args.crop,
+        sample_range=args.sample_range,
+        strict=args.strict,
+    )
+    if not from_stage:
+        options["camera"] = args.camera
+        options["product"] = args.product
+    return options
+
+
+def is_scene_file(args: argparse.Namespace) -> bool:
+    """Tell whether the stage is a scene that was exported before."""
+    return bool(args.stage.endswith(SCENE_SUFFIX))
+
+
+def stage_options(args: argparse.Namespace) -> dict[str, Any]:
+    """Return how ``args`` want the stage read, as keywords of the listings and of :meth:`abbe.Scene.from_stage`."""
+    return {
+        "variants": args.variant,
+        "overrides": args.overrides,
+        "search_paths": args.search_path,
+        "frame": frame(args),
+    }
+
+
+def frame(args: argparse.Namespace) -> float | Literal["default"] | None:
+    """Return the one time code that ``args`` ask for."""
+    if args.default_time and args.frame is not None:
+        raise UsageError("--defaultTime: contradicts --frame: give one of them")
+    if args.default_time:
+        return "default"
+    time: float | None = args.frame
+    return time
+
+
+def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None) -> Scene:
+    """Load the stage, or the scene file, at a time code."""
+    messages.show_warnings(getattr(args, "quiet", False))
+    if not is_scene_file(args):
+        return Scene.from_stage(
+            args.stage,
+            frame=time,
+            camera=args.camera,
+            render_settings=args.render_settings,
+            product=args.product,
+            purposes=args.purposes,
+            variants=args.variant,
+            overrides=args.overrides,
+            search_paths=args.search_path,
+            missing=args.missing,
+            strict=args.strict,
+        )
+    given = {
+        "--frame, --frames, --defaultTime": time is not None,
+        "--render-settings": args.render_settings is not None,
+        "--purposes": args.purposes is not None,
+        "--variant": bool(args.variant),
+        "--set": bool(args.overrides),
+        "--search-path": bool(args.search_path),
+    }
+    for option, is_given in given.items():
+        if is_given:
+            raise UsageError(f"{option}: {args.stage} is an exported scene, in which this is settled: export it again")
+    return Scene.load(args.stage)

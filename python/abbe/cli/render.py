@@ -1,0 +1,187 @@
+"""``abbe render``: stages to EXR files."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from .. import __version__
+from .._api import Options, Scene
+from .._core import Film
+from ..errors import AbbeError, UsageError
+from . import frames, messages, options
+from .progress import Reporter
+
+PARTIAL = 3
+
+Time = float | Literal["default"] | None
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser("render", help="render a stage to EXR", allow_abbrev=False)
+    options.add_stage(parser, time=False)
+    parser.add_argument(
+        "out",
+        nargs="?",
+        metavar="OUT",
+        help="the .exr to write, instead of the stage's one product; #### is the frame",
+    )
+    group = parser.add_argument_group("frames")
+    group.add_argument(
+        "--frames",
+        "-f",
+        metavar="SPEC",
+        help="such as 1, 1:4, 1:10x2, 1-4, 1-10:2, lists with commas; the stage's start unless given",
+    )
+    group.add_argument(
+        "--defaultTime", "-d", dest="default_time", action="store_true", help="read default values, not time samples"
+    )
+    options.add_request(parser)
+    group = parser.add_argument_group("reports")
+    group.add_argument("--stats", metavar="FILE.json", help="write what was counted, chosen and warned of")
+    group.add_argument("--preview", metavar="FILE.png", help="write a picture of the layers in false colour")
+    options.add_quiet(parser)
+    parser.set_defaults(run=run)
+
+
+@dataclass
+class _Outcome:
+    """What has been written so far."""
+
+    files: list[str] = field(default_factory=list)
+    renders: list[dict[str, Any]] = field(default_factory=list)
+
+
+def _times(args: argparse.Namespace) -> list[Time]:
+    if args.default_time and args.frames:
+        raise UsageError("--defaultTime: contradicts --frames: give one of them")
+    if args.default_time:
+        return ["default"]
+    return list(frames.parse(args.frames)) if args.frames else [None]
+
+
+def _check_output(path: str, option: str, suffix: str) -> None:
+    """Refuse what could not be written, before any time is spent."""
+    target = Path(path)
+    if target.suffix.lower() != suffix:
+        hint = "; --preview FILE.png makes a picture" if suffix == ".exr" else ""
+        raise UsageError(f"{option} {path}: must end with {suffix}{hint}")
+    if target.is_dir():
+        raise UsageError(f"{option} {path}: is a folder: name a file in it")
+    folder = target.parent
+    if not folder.is_dir():
+        raise AbbeError(f"{path}: the folder {folder} does not exist: create it")
+    if not os.access(folder, os.W_OK):
+        raise AbbeError(f"{path}: the folder {folder} cannot be written to: choose another")
+
+
+def _outputs(scene: Scene, args: argparse.Namespace, time: Time, request: Options) -> list[str]:
+    """Return the file of each plan."""
+    plans = scene.plans(**request)
+    if args.out is not None:
+        if len(plans) > 1:
+            names = ", ".join(plan.product for plan in plans)
+            raise UsageError(f"OUT {args.out}: the stage has {len(plans)} products: choose one with --product: {names}")
+        stage_time = scene.document["stage"].get("time_code")
+        outputs = [frames.name_for(args.out, stage_time if time is None else time, "OUT")]
+    else:
+        outputs = [plan.output for plan in plans]
+        for plan in plans:
+            if not plan.output:
+                where = f"{plan.product}.productName names" if plan.product else f"{args.stage} has"
+                raise UsageError(f"OUT: is missing, and {where} no usable output: give a file such as out.exr")
+    for output in outputs:
+        _check_output(output, "OUT", ".exr")
+    return outputs
+
+
+def _render_one(scene: Scene, index: int, output: str, args: argparse.Namespace, request: Options) -> Film:
+    """Render one plan to one file; interrupted, write what is finished and go on with the interruption."""
+    reporter = None if args.quiet else Reporter(output)
+    try:
+        film = scene.render_plan(index, progress=reporter, **request)
+    except BaseException as interruption:
+        partial: Film | None = getattr(interruption, "film", None)
+        if partial is not None and partial.statistics["pixels"] > 0:
+            if reporter:
+                reporter.close()
+            partial.write(output)
+            done, total = partial.statistics["pixels"], _area(partial)
+            messages.note(f"{output}: {done} of {total} pixels are finished, marked as partial")
+        raise
+    finally:
+        if reporter:
+            reporter.close()
+    film.write(output)
+    return film
+
+
+def _area(film: Film) -> int:
+    x0, y0, x1, y1 = film.window
+    return (x1 - x0) * (y1 - y0)
+
+
+def _write_statistics(path: str, outcome: _Outcome) -> None:
+    document = {"abbe": __version__, "renders": outcome.renders}
+    folder = Path(path).resolve().parent
+    with tempfile.NamedTemporaryFile("w", dir=folder, prefix=".abbe-", suffix=".part", delete=False) as file:
+        json.dump(document, file, indent=2)
+        file.write("\n")
+    Path(file.name).replace(path)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    times = _times(args)
+    outcome = _Outcome()
+    if args.out is not None:
+        frames.need_placeholder(args.out, times, "OUT")
+    if args.preview is not None:
+        frames.need_placeholder(args.preview, times, "--preview")
+        _check_output(args.preview, "--preview", ".png")
+    if args.stats is not None:
+        _check_output(args.stats, "--stats", ".json")
+    try:
+        for time in times:
+            _render_frame(args, time, outcome)
+    except (AbbeError, OSError) as error:
+        # With some frames written and others not, the output is partial, whatever went wrong.
+        if not outcome.files:
+            raise
+        messages.error(str(error))
+        messages.note(f"written before that: {', '.join(outcome.files)}")
+        return PARTIAL
+    finally:
+        if args.stats is not None and outcome.renders:
+            _write_statistics(args.stats, outcome)
+    return 0
+
+
+def _render_frame(args: argparse.Namespace, time: Time, outcome: _Outcome) -> None:
+    scene = options.open_scene(args, time)
+    request = options.request(args, from_stage=not options.is_scene_file(args))
+    outputs = _outputs(scene, args, time, request)
+    for output in outputs:
+        if output in outcome.files or outputs.count(output) > 1:
+            raise UsageError(f"{output}: several products or frames would write it: give them different names")
+    if args.preview is not None and len(outputs) > 1:
+        raise UsageError("--preview: there are several products: choose one with --product")
+    for index, output in enumerate(outputs):
+        film = _render_one(scene, index, output, args, request)
+        outcome.files.append(output)
+        outcome.renders.append({"output": output, "frame": scene.document["stage"].get("time_code"), **film.statistics})
+        if not args.quiet:
+            seconds = film.statistics["trace_seconds"]
+            print(f"{output}: {len(film)} AOVs, {_area(film)} pixels, {seconds:.2f} s", file=sys.stdout)
+        if args.preview is not None:
+            from ..preview import write_preview
+
+            preview = frames.name_for(args.preview, scene.document["stage"].get("time_code"), "--preview")
+            write_preview(output, preview)

@@ -1,0 +1,47 @@
+"""``abbe settings``: the render settings, products and variables of a stage."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from typing import Any
+
+from ..errors import UsageError
+from . import messages, options
+
+
+def add(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser("settings", help="list the render settings of a stage", allow_abbrev=False)
+    options.add_stage(parser)
+    parser.add_argument("--json", action="store_true", help="as JSON")
+    parser.set_defaults(run=run)
+
+
+def _size(resolution: tuple[int, int] | None) -> str:
+    return "resolution not authored" if resolution is None else f"{resolution[0]} x {resolution[1]}"
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    if options.is_scene_file(args):
+        raise UsageError(f"{args.stage}: is an exported scene: list the settings of its stage, or use abbe plan")
+    from ..usd import list_settings
+
+    found = list_settings(args.stage, **options.stage_options(args))
+    if args.json:
+        print(json.dumps([dataclasses.asdict(settings) for settings in found], indent=2))
+        return 0
+    for settings in found:
+        print(f"{settings.path}{'  (default)' if settings.is_default else ''}")
+        print(f"  {_size(settings.resolution)}, camera {settings.camera or 'not authored'}")
+        print(f"  purposes {', '.join(settings.purposes)}")
+        for product in settings.products:
+            print(f"  product {product.path}: {product.name or 'no usable productName'}")
+            print(f"    {product.product_type}, {_size(product.resolution)}, camera {product.camera or 'not authored'}")
+            for var in product.vars:
+                print(f"    {var.name}: {var.source_name} ({var.source_type}, {var.data_type})")
+    if not found:
+        messages.note(f"{args.stage}: has no RenderSettings; defaults apply")
+    return 0

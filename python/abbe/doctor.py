@@ -1,0 +1,98 @@
+"""What abbe finds on this machine: its own parts, and the libraries that it uses where they are."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import platform
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from . import __version__, _core
+from .schemas import plugin_path, register
+
+__all__ = ["Finding", "examine"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at."""
+
+    what: str
+    state: Literal["ok", "absent", "broken"]
+    text: str
+    """Version and place, or what to do."""
+
+
+def _core_finding() -> Finding:
+    try:
+        cores = len(os.sched_getaffinity(0))
+    except AttributeError:
+        cores = os.cpu_count() or 1
+    names = ", ".join(entry["name"] for entry in _core.integrators())
+    return Finding("abbe", "ok", f"{__version__}, integrators {names}, {cores} cores, {_core.__file__}")
+
+
+def _usd_finding() -> Finding:
+    """Look at the ``pxr`` that is importable: usd-core, an application's or a studio's."""
+    try:
+        usd = importlib.import_module("pxr.Usd")
+        ar = importlib.import_module("pxr.Ar")
+    except ModuleNotFoundError as error:
+        if error.name == "pxr":
+            return Finding("USD", "absent", "needed to read stages: pip install 'abbe[usd]'")
+        return Finding("USD", "broken", f"pxr is there but cannot be imported: {error}")
+    except ImportError as error:
+        return Finding("USD", "broken", f"pxr is there but cannot be imported: {error}")
+    version = ".".join(str(part) for part in usd.GetVersion())
+    resolver = type(ar.GetUnderlyingResolver()).__name__
+    return Finding("USD", "ok", f"{version}, resolver {resolver}, {Path(str(usd.__file__)).parent}")
+
+
+def _schema_finding() -> Finding:
+    folder = plugin_path()
+    missing = [name for name in ("plugInfo.json", "generatedSchema.usda") if not (folder / name).is_file()]
+    if missing:
+        return Finding("schemas", "broken", f"{folder} lacks {', '.join(missing)}: install abbe again")
+    try:
+        usd: Any = importlib.import_module("pxr.Usd")
+    except ImportError:
+        return Finding("schemas", "ok", f"{folder}, no USD to register them with")
+    if not register():
+        return Finding("schemas", "broken", f"{folder} is not known to USD: set PXR_PLUGINPATH_NAME to it")
+    known = usd.SchemaRegistry().FindAppliedAPIPrimDefinition("AbbeDispersionAPI") is not None
+    return Finding("schemas", "ok" if known else "broken", f"{folder}, {'known' if known else 'not known'} to USD")
+
+
+def _optional(what: str, module: str, extra: str, use: str, version: Callable[[Any], str]) -> Finding:
+    try:
+        found = importlib.import_module(module)
+    except ModuleNotFoundError:
+        return Finding(what, "absent", f"needed {use}: pip install 'abbe[{extra}]'")
+    except ImportError as error:
+        return Finding(what, "broken", f"{module} is there but cannot be imported: {error}")
+    return Finding(what, "ok", f"{version(found)}, {Path(str(found.__file__)).parent}")
+
+
+def examine() -> list[Finding]:
+    """Look at everything that abbe uses.
+
+    Returns
+    -------
+    list of Finding
+        Each ``ok``, ``absent`` (optional, with the way to get it) or ``broken``.
+    """
+    return [
+        _core_finding(),
+        Finding("Python", "ok", f"{platform.python_version()}, {sys.executable}"),
+        Finding("NumPy", "ok", f"{np.__version__}, {Path(np.__file__).parent}"),
+        _usd_finding(),
+        _schema_finding(),
+        _optional("OpenImageIO", "OpenImageIO", "check", "for abbe check", lambda oiio: str(oiio.VERSION_STRING)),
+        _optional("Pillow", "PIL", "preview", "for --preview", lambda pil: str(pil.__version__)),
+    ]

@@ -1,0 +1,7 @@
+//! Laws of the geometry: what is hit does not depend on trees, scales or luck.
+
+mod departures;
+mod hits;
+mod meshes;
+mod shapes;
+mod surfaces;
