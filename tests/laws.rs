@@ -1,11 +1,11 @@
 //! Laws that the calculus and the optics below it must obey, whatever the scene: Snell and Fermat, constants of motion,
 //! exact equalities, closed forms, golden values. Derivatives against full re-traces are in `derivatives.rs`.
 
-#[path = "support/bench.rs"]
-mod bench;
 #![expect(clippy::print_stdout, reason = "the worst errors found are what one reads these tests for")]
 #![expect(clippy::float_cmp, reason = "bounds are returned as they are given")]
 
+#[path = "support/bench.rs"]
+mod bench;
 #[path = "support/supplement.rs"]
 mod supplement;
 
