@@ -1,6 +1,9 @@
 //! Laws that the calculus and the optics below it must obey, whatever the scene: Snell and Fermat, constants of motion,
 //! exact equalities, closed forms, golden values. Derivatives against full re-traces are in `derivatives.rs`.
 
+#![expect(clippy::print_stdout, reason = "the worst errors found are what one reads these tests for")]
+#![expect(clippy::float_cmp, reason = "bounds are returned as they are given")]
+
 #[path = "support/bench.rs"]
 mod bench;
 #[path = "support/supplement.rs"]
@@ -24,7 +27,6 @@ type Big = FBig<dashu_float::round::mode::HalfEven, 2>;
 /// Enough bits for every exact sum and product of a few `f64` here.
 const BITS: usize = 400;
 
-#[expect(clippy::unwrap_used, reason = "only finite numbers are given")]
 fn big(x: f64) -> Big {
     Big::try_from(x).unwrap().with_precision(BITS).value()
 }
@@ -75,7 +77,7 @@ fn ulps(value: f64, exact: &Big) -> f64 {
 
 #[test]
 fn squared_normal_momentum_keeps_its_digits_down_to_total_cancellation() {
-    let mut worst = 0.0f64;
+    let (mut worst_near, mut worst_far) = (0.0f64, 0.0f64);
     let mut next = random(2);
     for (ior_i, ior_t) in
         [(1.5168, 1.0), (2.4175, 1.0), (1.5168, 1.3333), (1.0 + 1e-9, 1.0), (1.92286, 1.7), (1.0, 1.5)]
@@ -93,12 +95,13 @@ fn squared_normal_momentum_keeps_its_digits_down_to_total_cancellation() {
             let computed = w_squared(ior_i, ior_t, g);
             assert_eq!(computed > 0.0, exact > Big::ZERO, "total reflection is decided by the exact sign: {g:e}");
             if exact != Big::ZERO {
-                worst = worst.max(ulps(computed, &exact));
+                let worst = if i % 4 < 3 { &mut worst_near } else { &mut worst_far };
+                *worst = worst.max(ulps(computed, &exact));
             }
         }
     }
-    println!("W²: worst error {worst:.3} ε");
-    assert!(worst <= 2.0, "{worst} ε");
+    println!("W²: worst error {worst_near:.3} ε near the critical angle, {worst_far:.3} ε elsewhere");
+    assert!(worst_near <= 1.0 && worst_far <= 6.0, "{worst_near} ε, {worst_far} ε");
 }
 
 #[test]

@@ -3,9 +3,9 @@
 //! | law | n(λ), λ in µm | file |
 //! |---|---|---|
 //! | constant | n | here |
-//! | Cauchy | A + B λ⁻² + C λ⁻⁴ + … | [`cauchy`] |
-//! | Abbe number | n_d + B (λ⁻² − λ_d⁻²), B from V_d | [`cauchy`] |
-//! | Sellmeier | n² = A + Σ Bᵢ λ² / (λ² − Cᵢ) | [`sellmeier`] |
+//! | Cauchy | A + B λ⁻² + C λ⁻⁴ + … | `cauchy.rs` |
+//! | Abbe number | n_d + B (λ⁻² − λ_d⁻²), B from V_d | `cauchy.rs` |
+//! | Sellmeier | n² = A + Σ Bᵢ λ² / (λ² − Cᵢ) | `sellmeier.rs` |
 //!
 //! A law that exists is usable in all of 360–830 nm: constructors prove that no pole lies there and that n stays within
 //! 0.01–100, by bounds on intervals and not by sampling. Their errors say what is wrong and what to do; the caller adds
