@@ -560,7 +560,7 @@ def _difference(
 ) -> Difference:
     """Statistics of the absolute difference of a layer.
 
-    NumPy rather than ``ImageBufAlgo.compare``: that works in float32, which holds neither ids beyond 2**24 nor f64 sums.
+    NumPy rather than ``ImageBufAlgo.compare``: that works in float32, which holds neither large ids nor f64 sums.
     """
     height, width = pairs[0][0].shape
     worst = np.zeros((height, width))

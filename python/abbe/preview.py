@@ -28,45 +28,16 @@ from .errors import AbbeError, UsageError
 
 __all__ = ["Tile", "contact_sheet", "tiles_of", "write_preview"]
 
-_VIRIDIS = np.array(
-    [
-        [int(entry[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-        for entry in [
-            "440154",
-            "470d60",
-            "48186a",
-            "482374",
-            "472d7b",
-            "453781",
-            "424086",
-            "3e4989",
-            "3b528b",
-            "375b8d",
-            "33638d",
-            "2f6b8e",
-            "2c728e",
-            "297a8e",
-            "26828e",
-            "23898e",
-            "21918c",
-            "1f988b",
-            "1fa088",
-            "22a785",
-            "28ae80",
-            "32b67a",
-            "3fbc73",
-            "4ec36b",
-            "5ec962",
-            "70cf57",
-            "84d44b",
-            "98d83e",
-            "addc30",
-            "c2df23",
-            "d8e219",
-            "ece51b",
-            "fde725",
-        ]
-    ]
+_VIRIDIS = (
+    np.frombuffer(
+        bytes.fromhex(
+            "440154 470d60 48186a 482374 472d7b 453781 424086 3e4989 3b528b 375b8d 33638d 2f6b8e 2c728e 297a8e 26828e "
+            "23898e 21918c 1f988b 1fa088 22a785 28ae80 32b67a 3fbc73 4ec36b 5ec962 70cf57 84d44b 98d83e addc30 c2df23 "
+            "d8e219 ece51b fde725"
+        ),
+        np.uint8,
+    ).reshape(-1, 3)
+    / 255
 )
 
 # Colours saturate beyond this percentile of the magnitude, or below its complement where a scale does not begin at 0.
@@ -143,8 +114,8 @@ def write_preview(
 
     Parameters
     ----------
-    source : a film (a mapping from AOV to arrays of shape (height, width, channels), with ``film.valid(name)``), a plain
-        mapping of such arrays, or the path of an EXR that abbe wrote
+    source : a film (a mapping from AOV to arrays of shape (height, width, channels), with ``film.valid(name)``), a
+        mapping of such arrays alone, or the path of an EXR that abbe wrote
     path : the PNG file; it is replaced as a whole
     layers : which layers or AOVs to show, in this order; all if None
     aovs : the AOV table, which has the units; the renderer's own if None
@@ -358,7 +329,7 @@ def _weight(tile: Tile) -> np.ndarray | None:
 
 def _scaled(image_module: Any, picture: _Picture, weight: np.ndarray | None, size: tuple[int, int]) -> Any:
     """The picture at its size on the sheet, over the checker where there is no value."""
-    height, width = picture.colours.shape[:2]
+    width = picture.colours.shape[1]
     colours = np.round(255 * np.clip(picture.colours, 0, 1)).astype(np.uint8)
     image = image_module.fromarray(colours)
     resampling = image_module.Resampling
@@ -420,9 +391,10 @@ def _scalar(values: np.ndarray, some: np.ndarray) -> _Picture:
     low, high = _spread(inside)
     if low == high:
         return _Picture(_viridis(np.full_like(values, 0.5)), _note(f"{low:.7g} wherever there is a value"))
-    note = f"all values, {inside.min():.7g} to {inside.max():.7g}"
-    if low > inside.min() or high < inside.max():
-        note = f"percentiles {100 - _PERCENTILE:g} to {_PERCENTILE:g}; values reach {inside.min():.4g} and {inside.max():.4g}"
+    least, most = float(inside.min()), float(inside.max())
+    note = f"all values, {least:.7g} to {most:.7g}"
+    if low > least or high < most:
+        note = f"percentiles {100 - _PERCENTILE:g} to {_PERCENTILE:g}; values reach {least:.4g} and {most:.4g}"
     return _Picture(_viridis((values - low) / (high - low)), _bar(_viridis, low, high, note))
 
 
@@ -446,7 +418,8 @@ def _coordinates(values: np.ndarray, some: np.ndarray) -> _Picture:
     spans = [_spread(values[:, :, i][some]) for i in range(3)]
     colours = np.stack([(values[:, :, i] - a) / (b - a or 1) for i, (a, b) in enumerate(spans)], axis=-1)
     lines = [
-        f"{colour} = {axis}, {a:.4g} to {b:.4g}" for colour, axis, (a, b) in zip(("red", "green", "blue"), "xyz", spans)
+        f"{colour} = {axis}, {a:.4g} to {b:.4g}"
+        for colour, axis, (a, b) in zip(("red", "green", "blue"), "xyz", spans, strict=True)
     ]
     return _Picture(colours, _note(*lines))
 
@@ -498,7 +471,7 @@ def _identifiers(tile: Tile) -> _Picture:
         width = (box[2] - box[0]) // 2
         for slot, i in enumerate(shown):
             x, y = box[0] + slot % 2 * width, box[1] + slot // 2 * 18
-            canvas.draw.rectangle((x, y + 2, x + 11, y + 13), fill=tuple(round(255 * c) for c in palette[i]))
+            canvas.draw.rectangle((x, y + 2, x + 11, y + 13), fill=tuple(round(255 * float(c)) for c in palette[i]))
             number = int(found[i])
             path = tile.names[number - 1] if number <= len(tile.names) else ""
             _write(canvas, (x + 17, y), f"{number} {path.rpartition('/')[2]}", _SMALL, _FAINT, width - 24)
@@ -534,7 +507,7 @@ def _counts(values: np.ndarray) -> _Picture:
             if y + 20 > box[3]:
                 break
             canvas.draw.rectangle(
-                (x, y + 1, x + 15, y + 14), fill=tuple(round(255 * c) for c in palette[number]), outline=_FAINT
+                (x, y + 1, x + 15, y + 14), fill=tuple(round(255 * float(c)) for c in palette[number]), outline=_FAINT
             )
             _write(canvas, (x + 21, y), label, _SMALL, _FAINT)
             x += 52
@@ -600,7 +573,7 @@ def _bar(ramp: Callable[[np.ndarray], np.ndarray], low: float, high: float, note
         left, right, top = box[0], box[2] - 1, box[1] + 2
         colours = ramp((np.arange(left, right + 1) - left) / (right - left))
         for x, colour in zip(range(left, right + 1), colours, strict=True):
-            canvas.draw.line((x, top, x, top + 13), fill=tuple(int(round(255 * c)) for c in colour))
+            canvas.draw.line((x, top, x, top + 13), fill=tuple(round(255 * float(c)) for c in colour))
         middle = 0.5 * (low + high)
         for value, anchor, x in ((low, "la", left), (middle, "ma", (left + right) // 2), (high, "ra", right)):
             _write(canvas, (x, top + 19), f"{value:.4g}", _TEXT, _INK, anchor=anchor)
