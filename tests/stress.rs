@@ -1,8 +1,8 @@
 //! Numerical stress: randomised chains over all laws, surfaces and scales, at grazing and critical angles, between
 //! index-matched media, with 1 to 50 events, against multi-precision re-traces.
 //!
-//! Prints a table of the worst errors per category. `make stress` runs the long form. Environment:
-//! `ABBE_STRESS_CHAINS=N` judges N chains (default: a short form of a few seconds);
+//! Prints a table of the worst errors per category. `make stress` runs the long form (minutes), `make test` a short one
+//! (seconds). Environment: `ABBE_STRESS_CHAINS=N` judges N chains in either;
 //! `ABBE_STRESS_CASE=n` judges that one chain and prints everything about it.
 //!
 //! Errors are given as such and in units of the chain's condition number (see `oracle`). Only the latter have a bound:
@@ -31,6 +31,9 @@ const W_SQUARED_BOUND: f64 = 4.0 * f64::EPSILON;
 
 /// Chains of the short form, per category.
 const SHORT_FORM: usize = 16;
+
+/// And of the long one.
+const LONG_FORM: usize = 400;
 
 type Recipe = fn(&mut Random) -> Option<Chain>;
 
@@ -519,10 +522,23 @@ fn random_chains_agree_with_the_retrace() {
         repeat(case.parse().expect("ABBE_STRESS_CASE is a case number"));
         return;
     }
-    let chains: usize = match env::var("ABBE_STRESS_CHAINS") {
+    stress(chains_or(SHORT_FORM * CATEGORIES.len()));
+}
+
+#[test]
+#[ignore = "minutes: the long form, run by `make stress`"]
+fn many_random_chains_agree_with_the_retrace() {
+    stress(chains_or(LONG_FORM * CATEGORIES.len()));
+}
+
+fn chains_or(default: usize) -> usize {
+    match env::var("ABBE_STRESS_CHAINS") {
         Ok(chains) => chains.parse().expect("ABBE_STRESS_CHAINS is a number of chains"),
-        Err(_) => SHORT_FORM * CATEGORIES.len(),
-    };
+        Err(_) => default,
+    }
+}
+
+fn stress(chains: usize) {
     assert!(chains >= CATEGORIES.len(), "at least one chain of every category: {}", CATEGORIES.len());
     let clock = Instant::now();
     let outcomes: Vec<Outcome> = (0..chains as u64).into_par_iter().map(examine).collect();
