@@ -64,6 +64,7 @@ pub struct Hit {
 
 /// A shape in its object space.
 #[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "shapes stand behind an Arc, one each; a box would be a second hop")]
 pub enum Shape {
     /// An analytic sphere about the origin; an ellipsoid under a transform that is no similarity.
     Sphere(Sphere),

@@ -40,7 +40,6 @@ pub(super) struct ObjectRay {
 impl Placed {
     pub(super) fn new(instance: &Instance, origin: DVec3) -> Self {
         let DAffine3 { matrix3: linear, translation } = instance.world_from_object;
-        let linear = DMat3::from(linear);
         let inverse = inverse(linear);
         Self {
             shape: Arc::clone(&instance.shape),

@@ -139,7 +139,7 @@ impl<'a> PolygonMesh<'a> {
     /// Checks a primvar with `width` floats a value.
     pub(super) fn check_primvar(&self, name: &str, primvar: &PrimvarView<'_>, width: usize) -> Result<()> {
         let values = primvar.values.len() / width;
-        if primvar.values.len() % width != 0 {
+        if !primvar.values.len().is_multiple_of(width) {
             return Err(self.error(name, format!("{} floats are not a multiple of {width}", primvar.values.len())));
         }
         if let Some(i) = primvar.values.iter().position(|x| !x.is_finite()) {
