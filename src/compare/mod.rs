@@ -217,10 +217,8 @@ type Derivative<'a> = Box<dyn FnMut(&RayStart) -> Option<DVec3> + 'a>;
 
 fn methods(tracer: &Tracer<'_>, nm: f64, cases: &[Case], rounds: usize) -> Result<Vec<Method>> {
     let media = &tracer.media(nm)?;
-    let sides = STEPS
-        .iter()
-        .map(|&h| Ok((h, tracer.media(nm + h)?, tracer.media(nm - h)?)))
-        .collect::<Result<Vec<_>>>()?;
+    let sides =
+        STEPS.iter().map(|&h| Ok((h, tracer.media(nm + h)?, tracer.media(nm - h)?))).collect::<Result<Vec<_>>>()?;
     let mut ways: Vec<(String, Option<f64>, Derivative<'_>)> = vec![
         (
             "chain alone".into(),
@@ -309,7 +307,9 @@ fn predictions(tracer: &Tracer<'_>, nm: f64, cases: &[Case]) -> Result<Vec<Predi
         let mut errors = [Vec::new(), Vec::new()];
         for (case, (events_here, here, along)) in cases.iter().zip(&known) {
             let there = tracer.follow::<NoColumns>(&case.start, &shifted);
-            let (Some(here), Some(exact), true) = (*here, end(&there), events(&there) == *events_here) else { continue };
+            let (Some(here), Some(exact), true) = (*here, end(&there), events(&there) == *events_here) else {
+                continue;
+            };
             let first = along.point * delta;
             let second = first + along.point2 * (0.5 * delta * delta);
             let moved = exact - here;
@@ -343,7 +343,8 @@ fn costs(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart], rounds: usize) -> Re
         let medium = tracer.follower.start_medium(&media);
         let begin = Instant::now();
         for start in starts {
-            let chain = tracer.follower.follow::<ScreenColumns>(black_box(start), &media, Some(&mut log), &mut counters);
+            let chain =
+                tracer.follower.follow::<ScreenColumns>(black_box(start), &media, Some(&mut log), &mut counters);
             if chain.is_dispersive {
                 black_box(second_order_along(start, &medium, DVec3::ONE, &log));
             }

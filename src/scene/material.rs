@@ -60,6 +60,13 @@ pub struct Material {
     pub chosen: String,
 }
 
+impl Material {
+    /// Whether a ray inside is in another medium.
+    pub fn has_interior(&self) -> bool {
+        matches!(self.kind, Kind::Dielectric { thin_walled: false, .. })
+    }
+}
+
 /// What a ray of the specular chain does at a surface.
 #[derive(Clone, Debug)]
 pub enum Kind {
