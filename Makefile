@@ -75,8 +75,11 @@ test-rust:
 	  echo 'cargo test' && cargo test; \
 	fi
 
+# abbe-render comes in the profile of `cargo test`, which has compiled the library for it already.
 test-python: $(EXTENSION) $(WHEEL)
-	ABBE_WHEEL="$$(ls $(CURDIR)/dist/*.whl)" $(BIN)/python -m pytest
+	cargo build --quiet --bin abbe-render
+	ABBE_WHEEL="$$(ls $(CURDIR)/dist/*.whl)" ABBE_RENDER="$(abspath $(or $(CARGO_TARGET_DIR),target))/debug/abbe-render" \
+	  $(BIN)/python -m pytest
 
 lint: lint-rust lint-python
 
