@@ -7,6 +7,20 @@ from typing import Any, final
 import numpy as np
 import numpy.typing as npt
 
+__all__ = [
+    "Dispersion",
+    "Film",
+    "Scene",
+    "__version__",
+    "aov_aliases",
+    "aovs",
+    "integrators",
+    "merge",
+    "reflect",
+    "refract",
+    "transfer",
+]
+
 __version__: str
 
 _Path = str | PathLike[str]

@@ -5,8 +5,9 @@ import json
 import numpy as np
 import pytest
 import sample_exr
-from abbe.check import check
 from sample_exr import TABLE
+
+from abbe.check import check
 
 pytest.importorskip("OpenImageIO", reason="the check opens files with OpenImageIO")
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+
 from abbe import preview
 from abbe.errors import AbbeError, UsageError
 from abbe.preview import Tile, contact_sheet, write_preview
