@@ -1,6 +1,8 @@
 //! Laws of the whole renderer: what an AOV claims is true of the renderer's own views at other wavelengths, and nothing
 //! but the scene decides a bit.
 
+#![allow(clippy::float_cmp, reason = "exact values are the law under test")]
+
 mod support;
 
 use abbe::film::aov::AOVS;

@@ -118,19 +118,23 @@ def _read(path: Path, opened: Any) -> ExrImage:
     names = list(spec.channelnames)
     formats = [str(spec.channelformat(i)) for i in range(spec.nchannels)]
     channels: dict[str, np.ndarray] = {}
-    begin = 0
-    while begin < len(names):
-        # Neighbours of one type in one read; ids would lose digits in a common float type.
-        end = begin
-        while end < len(names) and formats[end] == formats[begin]:
-            end += 1
-        pixels = opened.read_image(0, 0, begin, end, formats[begin])
+    # One read per type, each over the channels from the first to the last of that type: a read decodes every block of
+    # the file, and a common float type would cost ids their digits.
+    for kind in sorted(set(formats)):
+        wanted = [i for i, found in enumerate(formats) if found == kind]
+        begin, end = wanted[0], wanted[-1] + 1
+        pixels = opened.read_image(0, 0, begin, end, kind)
         if pixels is None:
             raise UnreadableImageError(f"{path}: OpenImageIO cannot decode it: {_one_line(opened.geterror())}")
         pixels = np.asarray(pixels).reshape(spec.height, spec.width, end - begin)
-        for i in range(begin, end):
-            channels[names[i]] = pixels[:, :, i - begin]
-        begin = end
+        # Planes of their own: whoever looks at one channel should not stride over all others. Row by row, so that the
+        # transposition stays in the cache.
+        planes = np.empty((len(wanted), spec.height, spec.width), pixels.dtype)
+        columns = [i - begin for i in wanted]
+        for row in range(spec.height):
+            planes[:, row] = pixels[row].T[columns]
+        channels.update((names[i], plane) for i, plane in zip(wanted, planes, strict=True))
+    channels = {name: channels[name] for name in names}
     attributes = {attribute.name: attribute.value for attribute in spec.extra_attribs}
     return ExrImage(
         path=path,

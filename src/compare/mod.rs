@@ -360,15 +360,14 @@ fn costs(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart], rounds: usize) -> Re
     ];
     let mut times = vec![Vec::new(); passes.len()];
     let mut rays = 0;
-    for _ in 0..=rounds {
+    passes[0].1(); // warms up
+    for _ in 0..rounds {
         for ((_, pass), times) in passes.iter().zip(&mut times) {
             let (seconds, cast) = pass();
             times.push(seconds);
             rays = cast;
         }
     }
-    // The first round warms up.
-    times.iter_mut().for_each(|times| drop(times.remove(0)));
     let bare = times[0].clone();
     let row = |((name, _), times): (&(&str, Pass<'_>), Vec<f64>)| Cost {
         columns: (*name).to_owned(),

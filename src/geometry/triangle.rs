@@ -116,6 +116,7 @@ fn displaced_sign(e: f64, a: DVec2, b: DVec2) -> i8 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact values are the law under test")]
 mod tests {
     use super::*;
 

@@ -37,6 +37,7 @@ pub struct SurfacePoint {
 }
 
 /// How a chain ends.
+#[allow(clippy::large_enum_variant, reason = "one a chain, on the stack; most chains end at a surface")]
 #[derive(Clone, Copy, Debug)]
 pub enum End {
     /// At a surface that neither transmits nor mirrors.
@@ -277,6 +278,7 @@ impl<'a> Follower<'a> {
 }
 
 /// What a surface does to the chain.
+#[allow(clippy::large_enum_variant, reason = "one at a time, on the stack; most events scatter")]
 enum Event {
     End,
     Straight { is_interface: bool, rough: bool },
