@@ -66,7 +66,7 @@ fn main() -> ExitCode {
         Some(path) if !renders.is_empty() => write_statistics(path, &renders),
         _ => Ok(()),
     };
-    match outcome.and_then(|()| written) {
+    match outcome.and(written) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Error::Interrupted) => {
             eprintln!("abbe: interrupted");
