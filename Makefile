@@ -99,7 +99,9 @@ fmt: $(TOOLS)
 	$(BIN)/ruff check --fix --quiet
 	$(BIN)/ruff format
 
+# Figures that were kept stand in benches/RESULTS.md.
 bench: $(EXTENSION)
+	$(BIN)/abbe bench stages/gem.usda stages/ball.usda stages/prism.usda --csv $(OUT)/bench.csv --plot $(OUT)/bench.png
 	cargo bench
 
 stress: $(TOOLS)

@@ -279,6 +279,27 @@ class Scene:
         """
         return self._core.trace(_request(options), 0, pixel, sample)
 
+    def compare(self, *, rounds: int = 5, **options: Unpack[Options]) -> dict[str, Any]:
+        """Measure ways to get a derivative AOV against each other on this scene's own chains.
+
+        Parameters
+        ----------
+        rounds : how often each is timed; ratios are medians over the rounds
+        options : as for :func:`render`; of several products the first counts
+
+        Returns
+        -------
+        dict
+            ``costs`` of the columns (Mray/s, one thread), ``methods`` with time (ns per chain) and relative error of ∂p/∂λ,
+            ``predictions`` of where the ray at λ + δ lands, ``reference_error``, ``chains``.
+
+        Raises
+        ------
+        AbbeError
+            No pixel sees a surface through dispersive glass.
+        """
+        return self._core.compare(_request(options), 0, rounds)
+
     def render(self, *, progress: Callable[[Progress], object] | None = None, **options: Unpack[Options]) -> _core.Film:
         """Render one image.
 
