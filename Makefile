@@ -101,6 +101,7 @@ fmt: $(TOOLS)
 
 # Figures that were kept stand in benches/RESULTS.md.
 bench: $(EXTENSION)
+	@mkdir -p $(OUT)
 	$(BIN)/abbe bench stages/gem.usda stages/ball.usda stages/prism.usda --csv $(OUT)/bench.csv --plot $(OUT)/bench.png
 	cargo bench
 

@@ -290,8 +290,8 @@ class Scene:
         Returns
         -------
         dict
-            ``costs`` of the columns (Mray/s, one thread), ``methods`` with time (ns per chain) and relative error of ∂p/∂λ,
-            ``predictions`` of where the ray at λ + δ lands, ``reference_error``, ``chains``.
+            ``costs`` of the columns (Mray/s, one thread), ``methods`` with time (ns per chain) and relative error of
+            ∂p/∂λ, ``predictions`` of where the ray at λ + δ lands, ``reference_error``, ``chains``.
 
         Raises
         ------
