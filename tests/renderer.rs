@@ -483,6 +483,12 @@ fn a_cancelled_render_keeps_finished_tiles() {
     assert_eq!(image.statistics.pixels, 512);
     let valid = floats(&image.film, "depth").1;
     assert_eq!(valid.iter().filter(|&&v| v == 1.0).count(), 512);
+    // What is missing cannot be merged away.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part.exr");
+    abbe::exr::write(&path, &image.film, &image.metadata).unwrap();
+    let error = abbe::exr::merge(&[path], &folder.path().join("merged.exr")).expect_err("merged an unfinished image");
+    assert!(error.to_string().contains("interrupted"), "{error}");
 }
 
 #[test]

@@ -19,7 +19,9 @@ Comparison = Mapping[str, Any]
 def _aligned(rows: Sequence[Sequence[str]]) -> str:
     """Return a Markdown table whose first row is the head."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    lines = ["| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |" for row in rows]
+    lines = [
+        "| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |" for row in rows
+    ]
     rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
     return "\n".join([lines[0], rule, *lines[1:]])
 
@@ -62,8 +64,8 @@ def table(title: str, comparison: Comparison) -> str:
             f"## {title}",
             "Cost of the columns on every ray of the image, one thread:",
             _aligned(costs),
-            f"Relative error of ∂p/∂λ on {comparison['chains']} chains. The reference (extrapolated re-traces) is itself "
-            f"known to {known} (median, 99 %, worst): smaller errors mean nothing.",
+            f"Relative error of ∂p/∂λ on {comparison['chains']} chains. The reference (extrapolated re-traces) is "
+            f"itself known to {known} (median, 99 %, worst): smaller errors mean nothing.",
             _aligned(methods),
             "Where the ray at λ + δ lands, predicted from the derivatives at λ, relative to its displacement:",
             _aligned(predictions),
@@ -92,7 +94,9 @@ def write_csv(path: str | os.PathLike[str], comparisons: Iterable[tuple[str, Com
                 row = [stage, "derivative", m["name"], step, m["ns_per_chain"], m["time_ratio"]]
                 writer.writerow([*row, *m["error"].values()])
             for p in comparison["predictions"]:
-                writer.writerow([stage, "prediction", f"order {p['order']}", p["delta_nm"], "", "", *p["error"].values()])
+                writer.writerow(
+                    [stage, "prediction", f"order {p['order']}", p["delta_nm"], "", "", *p["error"].values()]
+                )
 
 
 def write_plot(path: str | os.PathLike[str], comparisons: Sequence[tuple[str, Comparison]]) -> None:
@@ -129,14 +133,18 @@ def write_plot(path: str | os.PathLike[str], comparisons: Sequence[tuple[str, Co
             for m, time, error in zip(methods, times, errors, strict=True):
                 if m["step_nm"] is not None:
                     left.annotate(f"{m['step_nm']:g} nm", (time, error), (5, 2), textcoords="offset points", fontsize=7)
-        left.set(xlabel="ns per chain", ylabel="median relative error of ∂p/∂λ", title=f"{Path(stage).stem}: a derivative")
+        left.set(
+            xlabel="ns per chain", ylabel="median relative error of ∂p/∂λ", title=f"{Path(stage).stem}: a derivative"
+        )
         left.set_ylim(bottom=min(known / 30, 1e-13))
         left.legend(fontsize=7)
         for order, marker in ((1, "o"), (2, "s")):
             rows = [p for p in comparison["predictions"] if p["order"] == order]
             distance = [p["delta_nm"] for p in rows]
             right.loglog(distance, [p["error"]["median"] for p in rows], f"{marker}-", label=f"order {order}, median")
-            right.loglog(distance, [p["error"]["p99"] for p in rows], f"{marker}:", color="0.6", label=f"order {order}, 99 %")
+            right.loglog(
+                distance, [p["error"]["p99"] for p in rows], f"{marker}:", color="0.6", label=f"order {order}, 99 %"
+            )
         right.set(xlabel="δ, nm", ylabel="error / displacement", title=f"{Path(stage).stem}: predicting λ + δ")
         right.legend(fontsize=7)
         for axis in (left, right):
@@ -144,7 +152,7 @@ def write_plot(path: str | os.PathLike[str], comparisons: Sequence[tuple[str, Co
     figure.tight_layout()
     try:
         figure.savefig(path, dpi=110)
-    except (OSError, ValueError) as error:
-        raise AbbeError(f"{path}: cannot be written: {error}") from error
+    except (OSError, ValueError) as problem:
+        raise AbbeError(f"{path}: cannot be written: {problem}") from problem
     finally:
         plt.close(figure)

@@ -109,7 +109,7 @@ impl Aggregate {
     }
 
     /// For each instance that `is_member`, whether its bounds meet those of another member: only then can their surfaces
-    /// coincide. More than [`MANY`] members are not compared, and count as touching.
+    /// coincide. More than 4096 members are not compared, and count as touching.
     pub fn touching(&self, is_member: impl Fn(u32) -> bool) -> Vec<bool> {
         let mut touching = vec![false; self.placed.len()];
         let members: Vec<(usize, Bounds)> = (0..self.placed.len())

@@ -1,7 +1,7 @@
 //! What a material says, compiled to what a ray follows.
 //!
-//! The index comes from the first of: our `abbe:…` attributes ([`law`]); the dispersion inputs of the shading network,
-//! each by its own specification ([`dialect`]); a scalar index, constant unless [`ScalarIor`] says otherwise. Fallbacks
+//! The index comes from the first of: our `abbe:…` attributes (`law`); the dispersion inputs of the shading network,
+//! each by its own specification (`dialect`); a scalar index, constant unless [`ScalarIor`] says otherwise. Fallbacks
 //! of a schema never decide, only authored values do, and what decided stands in [`Material::chosen`].
 
 mod dialect;
