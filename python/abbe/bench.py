@@ -130,9 +130,9 @@ def write_plot(path: str | os.PathLike[str], comparisons: Sequence[tuple[str, Co
             times = [m["ns_per_chain"] for m in methods]
             errors = [max(m["error"]["median"], 1e-17) for m in methods]
             left.loglog(times, errors, "o" if len(methods) == 1 else "s", markersize=6, label=name)
-            for m, time, error in zip(methods, times, errors, strict=True):
+            for m, x, y in zip(methods, times, errors, strict=True):
                 if m["step_nm"] is not None:
-                    left.annotate(f"{m['step_nm']:g} nm", (time, error), (5, 2), textcoords="offset points", fontsize=7)
+                    left.annotate(f"{m['step_nm']:g} nm", (x, y), (5, 2), textcoords="offset points", fontsize=7)
         left.set(
             xlabel="ns per chain", ylabel="median relative error of ∂p/∂λ", title=f"{Path(stage).stem}: a derivative"
         )
