@@ -11,7 +11,6 @@
 //!
 //! Sources: OpenEXR, *File Layout* and `ImfStandardAttributes.h` (3.4).
 
-mod atomic;
 mod header;
 pub mod layout;
 mod merge;

@@ -13,10 +13,11 @@ use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::Aov;
 use crate::film::{SampleRange, Window};
+use crate::geometry::Shape;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
-use crate::scene::Scene;
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
+use crate::scene::{Object, Scene};
 use crate::spectrum::Wavelength;
 
 /// One layer to be rendered.
@@ -212,16 +213,16 @@ fn reasons(
         if names.is_empty() {
             "no AOV asks for it".to_owned()
         } else if optics.dispersion_scale == 0.0 {
-            format!("the dispersion scale is 0, so {} is exactly 0", names.join(", "))
+            format!("the dispersion scale is 0: {} exactly 0", list(names, "is", "are"))
         } else {
-            format!("no material in use disperses, so {} is exactly 0", names.join(", "))
+            format!("no material in use disperses: {} exactly 0", list(names, "is", "are"))
         }
     };
     let mut decide = |what: &str, computed: bool, families: &[Family]| {
         let names = asked(families);
         let because = dispersive.map_or_else(String::new, |m| format!(", and {} disperses", m.path));
         let (list, why) = if computed {
-            (&mut carried, format!("{} asks for it{because}", names.join(", ")))
+            (&mut carried, format!("{} for it{because}", list(&names, "asks", "ask")))
         } else {
             (&mut skipped, why_not(&names))
         };
@@ -247,16 +248,27 @@ fn reasons(
     };
     let chain_asked = asked(&[Chain, LambdaColumn, LambdaSecondOrder, ScreenColumns, ScreenSecondOrder, Retrace]);
     if needs.chain {
-        note(true, "specular chain", format!("{} tells about it", chain_asked.join(", ")));
+        note(true, "specular chain", format!("{} about it", list(&chain_asked, "tells", "tell")));
     } else {
         note(
             false,
             "specular chain",
-            format!("only the first surface is asked for ({})", asked(&[FirstSurface]).join(", ")),
+            format!("{} about the first surface only", list(&asked(&[FirstSurface]), "tells", "tell")),
         );
     }
-    let uv = layers.iter().any(|layer| layer.aov.name.ends_with("uv"));
-    note(uv, "texture coordinates", if uv { "uv is asked for".into() } else { "no AOV asks for them".into() });
+    let uv: Vec<_> = layers.iter().map(|layer| layer.aov.name).filter(|name| name.ends_with("uv")).collect();
+    let why =
+        if uv.is_empty() { "no AOV asks for them".into() } else { format!("{} for them", list(&uv, "asks", "ask")) };
+    note(!uv.is_empty(), "texture coordinates", why);
+    if needs.columns > Columns::None {
+        match scene.objects.iter().find(|object| is_smooth_glass(scene, object)) {
+            Some(object) => {
+                let path = &scene.prims[object.prim_id as usize - 1];
+                note(true, "∂N, how normals move", format!("{path} is glass with a curved or smooth-shaded surface"));
+            }
+            None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
+        }
+    }
     note(
         false,
         "light sampling, emission, textures",
@@ -266,6 +278,26 @@ fn reasons(
         note(false, reason, format!("{count} left out by the bridge"));
     }
     (carried, skipped)
+}
+
+/// Names with the verb for one or for many; of a long list the first few.
+fn list(names: &[&str], one: &str, many: &str) -> String {
+    const SHOWN: usize = 4;
+    match names {
+        [name] => format!("{name} {one}"),
+        names if names.len() <= SHOWN + 1 => format!("{} {many}", names.join(", ")),
+        names => format!("{} and {} more {many}", names[..SHOWN].join(", "), names.len() - SHOWN),
+    }
+}
+
+/// Whether the object is glass whose normals move over its surface.
+fn is_smooth_glass(scene: &Scene, object: &Object) -> bool {
+    let is_glass = |id: &u32| id.checked_sub(1).is_some_and(|i| scene.materials[i as usize].has_interior());
+    let is_smooth = match &*object.shape {
+        Shape::Sphere(_) => true,
+        Shape::Mesh(mesh) => mesh.has_normals(),
+    };
+    is_smooth && object.material_ids.iter().any(is_glass)
 }
 
 impl fmt::Display for Plan {
@@ -295,8 +327,10 @@ impl fmt::Display for Plan {
             nm(self.optics.band[1]),
             self.optics.dispersion_scale
         )?;
-        let names: Vec<_> = self.layers.iter().map(|layer| layer.aov.name).collect();
-        writeln!(f, "layers       {}", names.join(", "))?;
+        for (i, names) in self.layers.chunks(6).enumerate() {
+            let names: Vec<_> = names.iter().map(|layer| layer.aov.name).collect();
+            writeln!(f, "{:13}{}", if i == 0 { "layers" } else { "" }, names.join(", "))?;
+        }
         for (title, decisions) in
             [("carried", &self.carried), ("skipped", &self.skipped), ("materials", &self.materials)]
         {
