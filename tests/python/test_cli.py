@@ -129,6 +129,13 @@ def test_statistics_and_preview(run: Run, slab: Slab, tmp_path: Path) -> None:
     assert stats["renders"][0]["frame"] == 7
     assert (tmp_path / "look.png").read_bytes().startswith(b"\x89PNG")
     assert leftovers(tmp_path) == ["look.png", "out.exr", "stats.json"]
+    # All have the rights that the umask gives.
+    (tmp_path / "plain").touch()
+    rights = (tmp_path / "plain").stat().st_mode
+    assert {name: (tmp_path / name).stat().st_mode for name in ("look.png", "stats.json")} == {
+        "look.png": rights,
+        "stats.json": rights,
+    }
 
 
 # Frames

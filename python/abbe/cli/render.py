@@ -6,7 +6,6 @@ import argparse
 import json
 import os
 import sys
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -14,6 +13,7 @@ from typing import Any, Literal
 from .. import __version__
 from .._api import Options, Scene
 from .._core import Film
+from .._files import replacing
 from ..errors import AbbeError, UsageError
 from . import frames, messages, options
 from .progress import Reporter
@@ -130,11 +130,8 @@ def _area(film: Film) -> int:
 
 def _write_statistics(path: str, outcome: _Outcome) -> None:
     document = {"abbe": __version__, "renders": outcome.renders}
-    folder = Path(path).resolve().parent
-    with tempfile.NamedTemporaryFile("w", dir=folder, prefix=".abbe-", suffix=".part", delete=False) as file:
-        json.dump(document, file, indent=2)
-        file.write("\n")
-    Path(file.name).replace(path)
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
 def run(args: argparse.Namespace) -> int:
