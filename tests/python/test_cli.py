@@ -373,6 +373,9 @@ def test_help_is_there_for_every_command(run: Run) -> None:
     ):
         assert command in overview
         assert run(command, "--help").returncode == 0
+        # The stage is offered as a scene file where it may be one.
+        takes_scenes = command in ("render", "plan", "export", "trace")
+        assert ("an exported .safetensors scene" in " ".join(run(command, "--help").stdout.split())) == takes_scenes
     assert run("--version").stdout == f"abbe {abbe.__version__}\n"
 
 
