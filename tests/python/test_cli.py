@@ -13,6 +13,7 @@ import pytest
 
 import abbe
 from abbe.cli import frames
+from abbe.cli import render as render_command
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 Slab = Callable[..., Path]
@@ -41,6 +42,28 @@ def test_render_writes_the_file_and_says_so(run: Run, slab: Slab, tmp_path: Path
     assert result.returncode == 0, result.stderr
     assert result.stdout.startswith("out.exr: 2 AOVs, 512 pixels")
     assert leftovers(tmp_path) == ["out.exr"]
+
+
+def test_one_is_singular(run: Run, slab: Slab) -> None:
+    result = run("render", slab(), "out.exr", "--width", "32", "--aov", "ior", "--crop", "3,4,4,5")
+    assert result.stdout.startswith("out.exr: 1 AOV, 1 pixel, "), result.stderr
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "0 s"),
+        (0.000123456, "0.000123 s"),
+        (0.0456, "0.0456 s"),
+        (0.5, "0.500 s"),
+        (0.9996, "1.00 s"),
+        (12.345, "12.3 s"),
+        (99.96, "100 s"),
+        (12345.6, "12346 s"),
+    ],
+)
+def test_times_have_three_digits(seconds: float, text: str) -> None:
+    assert render_command._seconds(seconds) == text
 
 
 def test_quiet_says_nothing(run: Run, slab: Slab) -> None:
