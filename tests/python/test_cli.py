@@ -267,6 +267,11 @@ def test_bad_stages(run: Run, slab: Slab, tmp_path: Path) -> None:
     said(run("render", "missing.usda", "out.exr"), 1, "missing.usda")
     (tmp_path / "text.usda").write_text("this is no stage")
     said(run("render", "text.usda", "out.exr"), 1, "text.usda")
+    (tmp_path / "o.exr").write_bytes(b"v/1\x01 and more")
+    line = said(run("plan", "o.exr"), 1, "o.exr: is not a USD file: name a .usd, .usda, .usdc or .usdz file")
+    assert line.endswith("or an exported .safetensors scene")
+    assert "safetensors" not in said(run("list-cameras", "o.exr"), 1, "o.exr: is not a USD file: name a .usd")
+    (tmp_path / "o.exr").unlink()
     (tmp_path / "noise.safetensors").write_bytes(bytes(range(256)))
     said(run("render", "noise.safetensors", "out.exr"), 1, "noise.safetensors")
     for name, edit in {

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 from .._api import Options, Scene
-from ..errors import UsageError
+from ..errors import NotUsdError, UsageError
 from . import messages
 
 __all__ = ["add_quiet", "add_request", "add_stage", "numbers", "open_scene", "request", "stage_options"]
@@ -208,19 +208,22 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
     """Load the stage, or the scene file, at a time code."""
     messages.show_warnings(getattr(args, "quiet", False))
     if not is_scene_file(args):
-        return Scene.from_stage(
-            args.stage,
-            frame=time,
-            camera=args.camera,
-            render_settings=args.render_settings,
-            product=args.product,
-            purposes=args.purposes,
-            variants=args.variant,
-            overrides=args.overrides,
-            search_paths=args.search_path,
-            missing=args.missing,
-            strict=args.strict,
-        )
+        try:
+            return Scene.from_stage(
+                args.stage,
+                frame=time,
+                camera=args.camera,
+                render_settings=args.render_settings,
+                product=args.product,
+                purposes=args.purposes,
+                variants=args.variant,
+                overrides=args.overrides,
+                search_paths=args.search_path,
+                missing=args.missing,
+                strict=args.strict,
+            )
+        except NotUsdError as error:
+            raise NotUsdError(f"{error}, or {_SCENE_FILE}") from None
     given = {
         "--frame, --frames, --defaultTime": time is not None,
         "--render-settings": args.render_settings is not None,
