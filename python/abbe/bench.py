@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ._files import replacing
 from .errors import AbbeError
 
 __all__ = ["table", "write_csv", "write_plot"]
@@ -82,7 +83,7 @@ def write_csv(path: str | os.PathLike[str], comparisons: Iterable[tuple[str, Com
     comparisons : stages with what was measured on them
     """
     head = ["stage", "kind", "name", "parameter", "ns_per_chain", "ratio", "error_median", "error_p99", "error_max"]
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(head)
         for stage, comparison in comparisons:
@@ -151,7 +152,9 @@ def write_plot(path: str | os.PathLike[str], comparisons: Sequence[tuple[str, Co
             axis.grid(visible=True, which="major", color="0.9")
     figure.tight_layout()
     try:
-        figure.savefig(path, dpi=110)
+        with replacing(path) as temporary:
+            # The temporary name does not tell the format.
+            figure.savefig(temporary, dpi=110, format=Path(path).suffix.removeprefix(".").lower() or "png")
     except (OSError, ValueError) as problem:
         raise AbbeError(f"{path}: cannot be written: {problem}") from problem
     finally:

@@ -15,7 +15,6 @@ import colorsys
 import json
 import math
 import os
-import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from ._files import replacing
 from ._image import channel_name, read_exr
 from .errors import AbbeError, UsageError
 
@@ -123,31 +123,16 @@ def write_preview(
     Raises
     ------
     FileNotFoundError
-        The EXR does not exist, or the directory of ``path`` does not.
+        The EXR does not exist, or the folder of ``path`` does not.
     UsageError
         A layer is not there.
     AbbeError
         The EXR cannot be read, or Pillow is not installed.
     """
-    path = Path(path)
     tiles, title = tiles_of(source, layers=layers, aovs=aovs)
     sheet = contact_sheet(tiles, title=title)
-    if not path.parent.is_dir():
-        raise FileNotFoundError(
-            f"{path}: the directory {path.parent} does not exist: create it, or choose another place"
-        )
-    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as out:
-            sheet.save(out, format="PNG")
-        # mkstemp makes private files; an image has the rights that the user's umask gives.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    with replacing(path) as temporary:
+        sheet.save(temporary, format="PNG")
 
 
 def tiles_of(

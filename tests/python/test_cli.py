@@ -13,6 +13,7 @@ import pytest
 
 import abbe
 from abbe.cli import frames
+from abbe.cli import render as render_command
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 Slab = Callable[..., Path]
@@ -41,6 +42,28 @@ def test_render_writes_the_file_and_says_so(run: Run, slab: Slab, tmp_path: Path
     assert result.returncode == 0, result.stderr
     assert result.stdout.startswith("out.exr: 2 AOVs, 512 pixels")
     assert leftovers(tmp_path) == ["out.exr"]
+
+
+def test_one_is_singular(run: Run, slab: Slab) -> None:
+    result = run("render", slab(), "out.exr", "--width", "32", "--aov", "ior", "--crop", "3,4,4,5")
+    assert result.stdout.startswith("out.exr: 1 AOV, 1 pixel, "), result.stderr
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "0 s"),
+        (0.000123456, "0.000123 s"),
+        (0.0456, "0.0456 s"),
+        (0.5, "0.500 s"),
+        (0.9996, "1.00 s"),
+        (12.345, "12.3 s"),
+        (99.96, "100 s"),
+        (12345.6, "12346 s"),
+    ],
+)
+def test_times_have_three_digits(seconds: float, text: str) -> None:
+    assert render_command._seconds(seconds) == text
 
 
 def test_quiet_says_nothing(run: Run, slab: Slab) -> None:
@@ -129,6 +152,13 @@ def test_statistics_and_preview(run: Run, slab: Slab, tmp_path: Path) -> None:
     assert stats["renders"][0]["frame"] == 7
     assert (tmp_path / "look.png").read_bytes().startswith(b"\x89PNG")
     assert leftovers(tmp_path) == ["look.png", "out.exr", "stats.json"]
+    # All have the rights that the umask gives.
+    (tmp_path / "plain").touch()
+    rights = (tmp_path / "plain").stat().st_mode
+    assert {name: (tmp_path / name).stat().st_mode for name in ("look.png", "stats.json")} == {
+        "look.png": rights,
+        "stats.json": rights,
+    }
 
 
 # Frames
@@ -237,6 +267,11 @@ def test_bad_stages(run: Run, slab: Slab, tmp_path: Path) -> None:
     said(run("render", "missing.usda", "out.exr"), 1, "missing.usda")
     (tmp_path / "text.usda").write_text("this is no stage")
     said(run("render", "text.usda", "out.exr"), 1, "text.usda")
+    (tmp_path / "o.exr").write_bytes(b"v/1\x01 and more")
+    line = said(run("plan", "o.exr"), 1, "o.exr: is not a USD file: name a .usd, .usda, .usdc or .usdz file")
+    assert line.endswith("or an exported .safetensors scene")
+    assert "safetensors" not in said(run("list-cameras", "o.exr"), 1, "o.exr: is not a USD file: name a .usd")
+    (tmp_path / "o.exr").unlink()
     (tmp_path / "noise.safetensors").write_bytes(bytes(range(256)))
     said(run("render", "noise.safetensors", "out.exr"), 1, "noise.safetensors")
     for name, edit in {
@@ -366,6 +401,9 @@ def test_help_is_there_for_every_command(run: Run) -> None:
     ):
         assert command in overview
         assert run(command, "--help").returncode == 0
+        # The stage is offered as a scene file where it may be one.
+        takes_scenes = command in ("render", "plan", "export", "trace")
+        assert ("an exported .safetensors scene" in " ".join(run(command, "--help").stdout.split())) == takes_scenes
     assert run("--version").stdout == f"abbe {abbe.__version__}\n"
 
 
