@@ -389,7 +389,10 @@ def test_check_accepts_ours_and_refuses_noise(run: Run, slab: Slab, tmp_path: Pa
     assert result.returncode == 0, result.stdout + result.stderr
     assert run("check", "out.exr", "--against", "out.exr").returncode == 0
     (tmp_path / "noise.exr").write_bytes(b"noise")
-    assert run("check", "noise.exr").returncode == 4
+    said(run("check", "noise.exr"), 1, "noise.exr: is not an EXR that abbe wrote: ")
+    (tmp_path / "cut.exr").write_bytes((tmp_path / "out.exr").read_bytes()[:-100])
+    result = run("check", "cut.exr")
+    assert (result.returncode, len(result.stdout.splitlines()), result.stderr) == (4, 1, "")
     said(run("check", "missing.exr"), 1, "missing.exr")
 
 
