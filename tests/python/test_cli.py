@@ -8,10 +8,12 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import abbe
+from abbe import doctor
 from abbe.cli import frames
 from abbe.cli import render as render_command
 
@@ -373,9 +375,25 @@ def test_doctor_finds_everything_well_here(run: Run) -> None:
     result = run("doctor", "--json")
     assert result.returncode == 0, result.stdout
     findings = {finding["what"]: finding for finding in json.loads(result.stdout)}
-    assert {"abbe", "Python", "NumPy", "USD", "schemas", "OpenImageIO", "Pillow"} <= findings.keys()
+    assert {"abbe", "Python", "NumPy", "USD", "schemas", "OpenImageIO", "Pillow", "matplotlib"} <= findings.keys()
     assert findings["schemas"]["state"] == "ok"
     assert "USD" in run("doctor").stdout
+
+
+def test_doctor_names_the_extra_of_everything_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    extras = {"USD": "usd", "OpenImageIO": "check", "Pillow": "preview", "matplotlib": "plot"}
+    for module in ("pxr", "pxr.Usd", "OpenImageIO", "PIL", "matplotlib"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+
+    def find_spec(name: str, *_: object) -> None:
+        if name in ("pxr", "OpenImageIO", "PIL", "matplotlib"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+    monkeypatch.setattr(sys, "meta_path", [SimpleNamespace(find_spec=find_spec), *sys.meta_path])
+    findings = {finding.what: finding for finding in doctor.examine()}
+    for what, extra in extras.items():
+        assert findings[what].state == "absent"
+        assert findings[what].text.endswith(f"pip install 'abbe[{extra}]'")
 
 
 def test_plugin_path_is_a_folder_that_usd_can_register(run: Run) -> None:
