@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import abbe
 from abbe import doctor
 from abbe.cli import frames
 from abbe.cli import render as render_command
+from abbe.cli import trace as trace_command
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 Slab = Callable[..., Path]
@@ -366,9 +368,16 @@ def test_trace_prints_every_event(run: Run, slab: Slab) -> None:
     assert told["interfaces"] == len(told["events"]) >= 1
     text = run("trace", stage, "--pixel", "15,10", "--width", "32")
     assert text.returncode == 0, text.stderr
-    assert "∂λ" in text.stdout and "Refraction" in text.stdout
+    assert "∂λ" in text.stdout and " refraction at (" in text.stdout
+    assert not re.search(r"-0[,)]", text.stdout)
     said(run("trace", stage, "--pixel", "15", "--width", "32"), 2, "--pixel")
     said(run("trace", stage, "--pixel", "1,1", "--sample", "5"), 2, "--sample")
+
+
+def test_traces_are_told_in_plain_words() -> None:
+    for name in ("TotalReflection", "total_reflection"):
+        assert trace_command._event_name(name) == "total reflection"
+    assert trace_command._vector((-0.0, 0.0, -1e-12, 1 / 3)) == "(0, 0, -1e-12, 0.333333333)"
 
 
 def test_doctor_finds_everything_well_here(run: Run) -> None:
