@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 from . import _core
 from .errors import UsageError
 
-__all__ = ["Options", "Plan", "Progress", "Scene", "integrators", "merge", "render", "warning_text"]
+__all__ = ["Options", "Plan", "Progress", "Scene", "counted", "integrators", "merge", "render", "warning_text"]
 
 _log = logging.getLogger("abbe")
 
@@ -105,6 +105,11 @@ def _request(options: Options) -> str:
         except (TypeError, ValueError) as error:
             raise UsageError(f"{name}: {error}: give plain finite numbers, text or lists of them") from None
     return "{" + ",".join(texts) + "}"
+
+
+def counted(count: int, what: str) -> str:
+    """Return ``1 camera``, ``2 cameras``."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def warning_text(warning: Mapping[str, Any]) -> str:
@@ -222,6 +227,19 @@ class Scene:
             It cannot be written.
         """
         self._core.save(Path(path))
+
+    def __repr__(self) -> str:
+        document = self.document
+        parts = [
+            counted(len(document["cameras"]), "camera"),
+            counted(len(document["shapes"]), "shape"),
+            counted(len(document["materials"]), "material"),
+        ]
+        if (time_code := document["stage"].get("time_code")) is not None:
+            parts.append(f"frame {time_code:g}")
+        if self._told:
+            parts.append(counted(len(self._told), "warning"))
+        return f"<abbe.Scene of {Path(document['stage']['source']).name}: {', '.join(parts)}>"
 
     @property
     def document(self) -> dict[str, Any]:

@@ -2,18 +2,22 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import abbe
+from abbe import doctor
 from abbe.cli import frames
 from abbe.cli import render as render_command
+from abbe.cli import trace as trace_command
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 Slab = Callable[..., Path]
@@ -364,18 +368,41 @@ def test_trace_prints_every_event(run: Run, slab: Slab) -> None:
     assert told["interfaces"] == len(told["events"]) >= 1
     text = run("trace", stage, "--pixel", "15,10", "--width", "32")
     assert text.returncode == 0, text.stderr
-    assert "∂λ" in text.stdout and "Refraction" in text.stdout
+    assert "∂λ" in text.stdout and " refraction at (" in text.stdout
+    assert not re.search(r"-0[,)]", text.stdout)
     said(run("trace", stage, "--pixel", "15", "--width", "32"), 2, "--pixel")
     said(run("trace", stage, "--pixel", "1,1", "--sample", "5"), 2, "--sample")
+
+
+def test_traces_are_told_in_plain_words() -> None:
+    for name in ("TotalReflection", "total_reflection"):
+        assert trace_command._event_name(name) == "total reflection"
+    assert trace_command._vector((-0.0, 0.0, -1e-12, 1 / 3)) == "(0, 0, -1e-12, 0.333333333)"
 
 
 def test_doctor_finds_everything_well_here(run: Run) -> None:
     result = run("doctor", "--json")
     assert result.returncode == 0, result.stdout
     findings = {finding["what"]: finding for finding in json.loads(result.stdout)}
-    assert {"abbe", "Python", "NumPy", "USD", "schemas", "OpenImageIO", "Pillow"} <= findings.keys()
+    assert {"abbe", "Python", "NumPy", "USD", "schemas", "OpenImageIO", "Pillow", "matplotlib"} <= findings.keys()
     assert findings["schemas"]["state"] == "ok"
     assert "USD" in run("doctor").stdout
+
+
+def test_doctor_names_the_extra_of_everything_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    extras = {"USD": "usd", "OpenImageIO": "check", "Pillow": "preview", "matplotlib": "plot"}
+    for module in ("pxr", "pxr.Usd", "OpenImageIO", "PIL", "matplotlib"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+
+    def find_spec(name: str, *_: object) -> None:
+        if name in ("pxr", "OpenImageIO", "PIL", "matplotlib"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+    monkeypatch.setattr(sys, "meta_path", [SimpleNamespace(find_spec=find_spec), *sys.meta_path])
+    findings = {finding.what: finding for finding in doctor.examine()}
+    for what, extra in extras.items():
+        assert findings[what].state == "absent"
+        assert findings[what].text.endswith(f"pip install 'abbe[{extra}]'")
 
 
 def test_plugin_path_is_a_folder_that_usd_can_register(run: Run) -> None:
@@ -389,7 +416,10 @@ def test_check_accepts_ours_and_refuses_noise(run: Run, slab: Slab, tmp_path: Pa
     assert result.returncode == 0, result.stdout + result.stderr
     assert run("check", "out.exr", "--against", "out.exr").returncode == 0
     (tmp_path / "noise.exr").write_bytes(b"noise")
-    assert run("check", "noise.exr").returncode == 4
+    said(run("check", "noise.exr"), 1, "noise.exr: is not an EXR that abbe wrote: ")
+    (tmp_path / "cut.exr").write_bytes((tmp_path / "out.exr").read_bytes()[:-100])
+    result = run("check", "cut.exr")
+    assert (result.returncode, len(result.stdout.splitlines()), result.stderr) == (4, 1, "")
     said(run("check", "missing.exr"), 1, "missing.exr")
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from .. import __version__
-from .._api import Options, Scene
+from .._api import Options, Scene, counted
 from .._core import Film
 from .._files import replacing
 from ..errors import AbbeError, UsageError
@@ -128,10 +128,6 @@ def _area(film: Film) -> int:
     return (x1 - x0) * (y1 - y0)
 
 
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
-
-
 def _seconds(seconds: float) -> str:
     """Three significant digits, never as a power of ten; all digits of whole seconds."""
     if seconds <= 0:
@@ -188,7 +184,7 @@ def _render_frame(args: argparse.Namespace, time: Time, outcome: _Outcome) -> No
         outcome.files.append(output)
         outcome.renders.append({"output": output, "frame": scene.document["stage"].get("time_code"), **film.statistics})
         if not args.quiet:
-            counts = f"{_counted(len(film), 'AOV')}, {_counted(_area(film), 'pixel')}"
+            counts = f"{counted(len(film), 'AOV')}, {counted(_area(film), 'pixel')}"
             print(f"{output}: {counts}, {_seconds(film.statistics['trace_seconds'])}")
         if args.preview is not None:
             from ..preview import write_preview
