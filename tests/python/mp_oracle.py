@@ -90,9 +90,10 @@ class Glass:
 
 @dataclass(frozen=True)
 class Triangle:
-    """A facet; `normals` of its corners if it is shaded smoothly."""
+    """A part of a facet; `normals` of its corners if it is shaded smoothly."""
 
     prim: str
+    face: int
     corners: tuple[Vector, Vector, Vector]
     normals: tuple[Vector, Vector, Vector] | None
 
@@ -124,6 +125,7 @@ class Triangle:
 @dataclass(frozen=True)
 class Ball:
     prim: str
+    face = 0
     centre: Vector
     radius: Any
 
@@ -229,14 +231,14 @@ class Scene:
         normals = [vector(normal) for normal in mesh.GetNormalsAttr().Get() or []]
         assert not normals or (mesh.GetNormalsInterpolation() == "vertex" and matrix == Gf.Matrix4d(1))
         indices, first = mesh.GetFaceVertexIndicesAttr().Get(), 0
-        for count in mesh.GetFaceVertexCountsAttr().Get():
+        for number, count in enumerate(mesh.GetFaceVertexCountsAttr().Get()):
             face = list(indices[first : first + count])
             first += count
             for corner in range(1, count - 1):
                 ids = (face[0], face[corner], face[corner + 1])
                 a, b, c = (points[i] for i in ids)
                 smooth = tuple(normals[i] for i in ids) if normals else None
-                self.triangles.append(Triangle(str(mesh.GetPath()), (a, b, c), smooth))  # type: ignore[arg-type]
+                self.triangles.append(Triangle(str(mesh.GetPath()), number, (a, b, c), smooth))  # type: ignore[arg-type]
 
     def _sphere(self, sphere: UsdGeom.Sphere) -> None:
         self._material(sphere.GetPrim())
@@ -383,28 +385,19 @@ class Pixel:
         self.chain = scene.chain(self.x, self.y)
         self.at_reference = self.trace()
 
-    def trace(self, dx: Any = 0, dy: Any = 0, wavelength: Any = REFERENCE) -> Trace:
-        return self.scene.follow(self.chain, self.x + dx, self.y + dy, wavelength)
+    def trace(self, dx: Any = 0, dy: Any = 0, wavelength: Any = REFERENCE, chain: Chain | None = None) -> Trace:
+        return self.scene.follow(chain or self.chain, self.x + dx, self.y + dy, wavelength)
 
-    def trace_checked(self, dx: Any = 0, dy: Any = 0, wavelength: Any = REFERENCE) -> Trace:
-        """The same for a way that is not infinitesimal: a search from scratch has to meet the same surfaces and end at
-        the same place, if on another triangle of that plane."""
-        trace = self.trace(dx, dy, wavelength)
+    def _elsewhere(self, dx: Any, dy: Any, wavelength: Any) -> Chain:
+        """The chain some way off: it has to meet the same facets of glass and end on the same prim."""
         chain = self.scene.chain(self.x + dx, self.y + dy, wavelength)
-        if not self._is_same(chain, trace, self.scene.follow(chain, self.x + dx, self.y + dy, wavelength)):
+        here, there = (
+            ([(step.surface.prim, step.surface.face, step.reflects) for step in c.steps], c.end and c.end.prim)
+            for c in (self.chain, chain)
+        )
+        if here != there:
             raise OtherChain
-        return trace
-
-    def _is_same(self, chain: Chain, trace: Trace, anew: Trace) -> bool:
-        if [(step.surface, step.reflects) for step in chain.steps] != [
-            (step.surface, step.reflects) for step in self.chain.steps
-        ]:
-            return False
-        if chain.end is None or self.chain.end is None:
-            return chain.end is self.chain.end
-        # A wall's corners are coplanar to the digits of the stage file.
-        off = length(minus(anew.points[-1], trace.points[-1]))
-        return chain.end.prim == self.chain.end.prim and bool(off < 1e-6 * length(trace.points[-1]))
+        return chain
 
     def seen(self, trace: Trace) -> Vector:
         """The end point, or the direction where the chain ends in the environment."""
@@ -440,17 +433,20 @@ class Pixel:
         widths += [abs(square / rate) for square, rate in pairs if rate != 0]
         return min(widths)
 
-    def find(self, target: Vector, wavelength: Any) -> tuple[Any, Any]:
+    def find(self, target: Vector, wavelength: Any, chain: Chain | None = None) -> tuple[Any, Any]:
         """How far from this pixel `target` is seen at `wavelength`: Newton's method on the two equations that do not
         fix the surface itself."""
         dx = dy = MP.mpf(0)
+        chain = chain or self.chain
         # Two directions across the one the surface leaves free: its normal, or the direction itself.
-        free = target if self.chain.end is None else self.chain.end.geometric_normal(target)
-        side = unit(cross(free, [MP.mpf(0), MP.mpf(1), MP.mpf(0)] if abs(free[0]) > 0.6 else [MP.mpf(1), MP.mpf(0), MP.mpf(0)]))
+        free = target if chain.end is None else chain.end.geometric_normal(target)
+        side = unit(
+            cross(free, [MP.mpf(0), MP.mpf(1), MP.mpf(0)] if abs(free[0]) > 0.6 else [MP.mpf(1), MP.mpf(0), MP.mpf(0)])
+        )
         axes = (side, cross(unit(free), side))
 
         def at(dx: Any, dy: Any) -> list[Any]:
-            off = minus(self.seen(self.trace(dx, dy, wavelength)), target)
+            off = minus(self.seen(self.trace(dx, dy, wavelength, chain)), target)
             return [dot(off, axis) for axis in axes]
 
         for _ in range(60):
@@ -483,6 +479,8 @@ class Pixel:
 
     def fetch_offset(self, wavelength: Any) -> Vector:
         """Where the image at the reference shows what is seen here at `wavelength`."""
-        offset = list(self.find(self.seen(self.trace_checked(wavelength=wavelength)), REFERENCE))
-        self.trace_checked(*offset)
-        return offset
+        there = self._elsewhere(MP.mpf(0), MP.mpf(0), wavelength)
+        target = self.seen(self.trace(wavelength=wavelength, chain=there))
+        # Once more by the triangles that are met there: a facet's are coplanar only to the digits of the stage file.
+        near = self.find(target, REFERENCE)
+        return list(self.find(target, REFERENCE, self._elsewhere(*near, REFERENCE)))
