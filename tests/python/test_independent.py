@@ -9,9 +9,10 @@ import pytest
 
 pytest.importorskip("pxr.Usd", reason="reads stages with usd-core")
 pytest.importorskip("mpmath", reason="computes at 50 digits with mpmath")
-oiio = pytest.importorskip("OpenImageIO", reason="reads the EXR with OpenImageIO")
+pytest.importorskip("OpenImageIO", reason="reads the EXR with OpenImageIO")
 
 import mp_oracle as oracle
+import OpenImageIO as oiio
 from mp_oracle import MP, Pixel, Scene
 
 import abbe

@@ -1,4 +1,4 @@
-"""The motions on screen against what they claim, by images: points of a surface are followed from one image to the next.
+"""The motions on screen against what they claim, by images: points of surfaces are followed between them.
 
 `refracted_position` tells which point of the world a pixel sees. Rendered at another wavelength, the same point is
 found elsewhere, by inverse interpolation. Small windows of a large image are rendered, where maps between raster and
@@ -31,7 +31,7 @@ PLACES = {
     # After two to seven total reflections.
     "gem": [(123, 117), (95, 133), (102, 62), (163, 24)],
     # Cemented, with interpolated normals.
-    "lens": [(148, 117), (155, 79), (180, 60), (155, 91)],
+    "lens": [(150, 63), (155, 79), (180, 60), (155, 91)],
 }
 # Which channels' points are seen at the reference too, in a window without an edge.
 CHANNELS = {
