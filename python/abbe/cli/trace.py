@@ -66,7 +66,8 @@ def run(args: argparse.Namespace) -> int:
     print(f"camera {_vector(told['camera'])} direction {_vector(told['direction'])} ior {told['start_ior']:.9g}")
     for number, event in enumerate(told["events"], 1):
         before, after = event["ior"]
-        print(f"{number:3} {_event_name(event['event'])} at {_vector(event['position'])} after {_number(event['distance'])}")
+        name, distance = _event_name(event["event"]), _number(event["distance"])
+        print(f"{number:3} {name} at {_vector(event['position'])} after {distance}")
         print(f"      normal {_vector(event['normal'])}{' (geometric)' if event['geometric_normal_used'] else ''}")
         print(f"      ior {before:.9g} to {after:.9g}, W² {_number(event['w_squared'])}")
         _print_columns(event["columns"]["leaving"], "      ")
