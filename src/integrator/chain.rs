@@ -14,7 +14,7 @@ use crate::ray::{critical_distance, mirror, refract_or_reflect};
 use crate::scene::material::Kind;
 use crate::scene::view::{Media, View};
 
-/// A chain with more events than this has no end.
+/// A chain that would have more events than this has no end.
 pub const MAX_EVENTS: u32 = 64;
 
 /// Straight crossings (cut-outs, surfaces inside a medium of higher priority) that one chain may make.
@@ -223,19 +223,23 @@ impl<'a> Follower<'a> {
                     break;
                 }
                 Event::Straight { is_interface, rough } => {
+                    if walk.crossings > MAX_CROSSINGS || is_interface && chain.interfaces == MAX_EVENTS {
+                        chain.end = End::Exhausted;
+                        break;
+                    }
                     chain.interfaces += u32::from(is_interface);
                     chain.rough_interfaces += u32::from(rough);
                     if is_interface && chain.dielectric_id == 0 {
                         chain.dielectric_id = met.material_id;
                     }
-                    if chain.interfaces > MAX_EVENTS || walk.crossings > MAX_CROSSINGS {
-                        chain.end = End::Exhausted;
-                        break;
-                    }
                     continue;
                 }
                 Event::Scattered { scattering, rough } => (scattering, rough),
             };
+            if chain.interfaces == MAX_EVENTS {
+                chain.end = End::Exhausted;
+                break;
+            }
             chain.interfaces += 1;
             chain.rough_interfaces += u32::from(rough);
             counters.events += 1;
@@ -264,10 +268,6 @@ impl<'a> Follower<'a> {
             walk.turn(&met, momentum / medium.ior, &scattering);
             if let Some(log) = log.as_deref_mut() {
                 log.push(Step { transfer, scattering: Some(scattering) });
-            }
-            if chain.interfaces > MAX_EVENTS {
-                chain.end = End::Exhausted;
-                break;
             }
         }
         counters.exhausted += u64::from(matches!(chain.end, End::Exhausted));
