@@ -222,7 +222,8 @@ impl Mesh {
     pub(super) fn every_crossing(&self, origin: DVec3, direction: DVec3, mut found: impl FnMut(MeshHit)) {
         let sheared = ShearedRay::new(origin, direction);
         for primitive in 0..self.triangles.len() as u32 {
-            if let Some(TriangleHit { distance, barycentric, leaving }) = sheared.intersect(self.corners_f32(primitive).each_ref())
+            if let Some(TriangleHit { distance, barycentric, leaving }) =
+                sheared.intersect(self.corners_f32(primitive).each_ref())
                 && distance > 0.0
             {
                 found(MeshHit { primitive, distance, barycentric, leaving, at_start: false });
