@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use crate::geometry::{Departures, Hit, Ray};
 use crate::optics::IorJet;
-use crate::optics::media::MediaStack;
+use crate::optics::media::{Inside, MediaStack, MediumId};
 use crate::ray::{ColumnSet, LocalSurface, RayStart, ScatterKind, Scattering, Step, Transfer};
 use crate::ray::{critical_distance, mirror, refract_or_reflect};
 use crate::scene::material::Kind;
@@ -361,16 +361,15 @@ impl<'a> Walk<'a> {
                 Event::Straight { is_interface: true, rough }
             }
             &Kind::Dielectric { rough, .. } => {
-                let passage = self.passage(met, counters);
-                let next = passage.media.current();
-                if next == self.media.current() {
+                let far = self.far_side(met, counters);
+                if far.medium == self.media.current() {
                     // The same medium on both sides: no optics, and the columns do not notice.
-                    self.pass(met, passage);
+                    self.pass(met, far);
                     return Event::Straight { is_interface: false, rough: false };
                 }
-                let scattering = refract_or_reflect(momentum, &met.surface, medium, &media.of(next));
+                let scattering = refract_or_reflect(momentum, &met.surface, medium, &media.of(far.medium));
                 if scattering.kind == ScatterKind::Refraction {
-                    self.pass(met, passage);
+                    self.pass(met, far);
                 }
                 Event::Scattered { scattering, rough }
             }
@@ -379,47 +378,77 @@ impl<'a> Walk<'a> {
 
     /// What lies behind the surface, together with all glass that coincides with it: two cemented faces are one interface
     /// between their media, in whatever order rounding presents them.
-    fn passage(&self, met: &SurfacePoint, counters: &mut Counters) -> Passage {
-        let mut passage = Passage { media: self.media.clone(), departures: self.departures };
-        self.go_behind(&mut passage, &met.hit, met.material_id, counters);
-        if self.view.is_touching(&met.hit) {
-            let ahead = Ray { origin: met.point, direction: self.ray.direction };
-            for _ in 0..MAX_COINCIDENT {
-                counters.rays += 1;
-                let Some(hit) = self.view.intersect(&ahead, &passage.departures).filter(|hit| hit.at_start) else {
-                    break;
-                };
-                let id = self.view.material_id(&hit);
-                if self.view.inside(&hit, id).is_none() {
-                    break;
+    fn far_side(&self, met: &SurfacePoint, counters: &mut Counters) -> FarSide {
+        let inside = self.view.inside(&met.hit, met.material_id);
+        if !self.view.is_touching(&met.hit) {
+            // Nothing coincides: the stack is asked, not copied.
+            let medium = match inside {
+                Some(inside) if met.hit.leaving => self.media.preview_leave(&inside).unwrap_or_else(|_| {
+                    counters.unmatched_exits += 1;
+                    self.media.current()
+                }),
+                Some(inside) => self.media.preview_enter(&inside),
+                None => self.media.current(),
+            };
+            return FarSide { medium, inside, cluster: None };
+        }
+        let mut cluster = Cluster { media: self.media.clone(), departures: self.departures };
+        self.include(&mut cluster, &met.hit, inside, counters);
+        let ahead = Ray { origin: met.point, direction: self.ray.direction };
+        for _ in 0..MAX_COINCIDENT {
+            counters.rays += 1;
+            let Some(hit) = self.view.intersect(&ahead, &cluster.departures).filter(|hit| hit.at_start) else { break };
+            let inside = self.view.inside(&hit, self.view.material_id(&hit));
+            if inside.is_none() {
+                break;
+            }
+            self.include(&mut cluster, &hit, inside, counters);
+        }
+        FarSide { medium: cluster.media.current(), inside, cluster: Some(cluster) }
+    }
+
+    fn include(&self, cluster: &mut Cluster, hit: &Hit, inside: Option<Inside>, counters: &mut Counters) {
+        cluster.departures.depart(&self.ray, hit, hit.leaving);
+        match inside {
+            Some(inside) if hit.leaving => counters.unmatched_exits += u64::from(!cluster.media.leave(&inside)),
+            Some(inside) => cluster.media.enter(inside),
+            None => {}
+        }
+    }
+
+    /// Goes to the far side; the direction is the caller's.
+    fn pass(&mut self, met: &SurfacePoint, far: FarSide) {
+        self.crossings += 1;
+        self.ray.origin = met.point;
+        match (far.cluster, far.inside) {
+            (Some(cluster), _) => {
+                self.media = cluster.media;
+                self.departures = cluster.departures;
+            }
+            (None, inside) => {
+                self.departures.depart(&self.ray, &met.hit, met.hit.leaving);
+                match inside {
+                    // What was never entered is not left; the look has counted it.
+                    Some(inside) if met.hit.leaving => drop(self.media.leave(&inside)),
+                    Some(inside) => self.media.enter(inside),
+                    None => {}
                 }
-                self.go_behind(&mut passage, &hit, id, counters);
             }
         }
-        passage
-    }
-
-    fn go_behind(&self, passage: &mut Passage, hit: &Hit, material_id: u32, counters: &mut Counters) {
-        passage.departures.depart(&self.ray, hit, hit.leaving);
-        let Some(inside) = self.view.inside(hit, material_id) else { return };
-        if !hit.leaving {
-            passage.media.enter(inside);
-        } else if !passage.media.leave(&inside) {
-            counters.unmatched_exits += 1;
-        }
-    }
-
-    /// Takes what [`passage`](Self::passage) found; the direction is the caller's.
-    fn pass(&mut self, met: &SurfacePoint, passage: Passage) {
-        self.crossings += 1;
-        self.media = passage.media;
-        self.departures = passage.departures;
-        self.ray.origin = met.point;
     }
 }
 
 /// The far side of an interface.
-struct Passage {
+struct FarSide {
+    medium: Option<MediumId>,
+    /// What the surface that was met bounds.
+    inside: Option<Inside>,
+    /// Where several surfaces coincide: the state behind all of them.
+    cluster: Option<Cluster>,
+}
+
+/// The state of a walk behind coincident surfaces.
+struct Cluster {
     media: MediaStack,
     departures: Departures,
 }

@@ -20,7 +20,8 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
     let [width, height] = plan.resolution;
     let in_raster = (0..width as i32).contains(&pixel[0]) && (0..height as i32).contains(&pixel[1]);
     let Window { x0, y0, x1, y1 } = plan.window;
-    if !in_raster && !((x0..x1).contains(&pixel[0]) && (y0..y1).contains(&pixel[1])) {
+    let in_window = (x0..x1).contains(&pixel[0]) && (y0..y1).contains(&pixel[1]);
+    if !in_raster && !in_window {
         return Err(Error::usage(
             "--pixel",
             format!(
