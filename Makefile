@@ -75,8 +75,11 @@ test-rust:
 	  echo 'cargo test' && cargo test; \
 	fi
 
+# abbe-render comes in the profile of `cargo test`, which has compiled the library for it already.
 test-python: $(EXTENSION) $(WHEEL)
-	ABBE_WHEEL="$$(ls $(CURDIR)/dist/*.whl)" $(BIN)/python -m pytest
+	cargo build --quiet --bin abbe-render
+	ABBE_WHEEL="$$(ls $(CURDIR)/dist/*.whl)" ABBE_RENDER="$(abspath $(or $(CARGO_TARGET_DIR),target))/debug/abbe-render" \
+	  $(BIN)/python -m pytest
 
 lint: lint-rust lint-python
 
@@ -96,7 +99,10 @@ fmt: $(TOOLS)
 	$(BIN)/ruff check --fix --quiet
 	$(BIN)/ruff format
 
+# Figures that were kept stand in benches/RESULTS.md.
 bench: $(EXTENSION)
+	@mkdir -p $(OUT)
+	$(BIN)/abbe bench stages/gem.usda stages/ball.usda stages/prism.usda --csv $(OUT)/bench.csv --plot $(OUT)/bench.png
 	cargo bench
 
 stress: $(TOOLS)

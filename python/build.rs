@@ -2,7 +2,6 @@
 //!
 //! The folder's home is `plugin/` at the top of the repository, outside of the Python package; maturin follows no links, but
 //! takes files from a build script's `OUT_DIR`.
-#![expect(clippy::print_stdout, reason = "a build script talks to cargo through its output")]
 
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};

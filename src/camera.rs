@@ -88,7 +88,8 @@ impl Camera {
         if !(width > 0.0 && height > 0.0 && width.is_finite() && height.is_finite()) {
             return error("its apertures must be positive");
         }
-        if !is_orthographic && !(camera.focal_length > 0.0 && camera.focal_length.is_finite()) {
+        let has_focal_length = camera.focal_length > 0.0 && camera.focal_length.is_finite();
+        if !is_orthographic && !has_focal_length {
             return error("its focal length must be positive");
         }
         if !(pixel_aspect_ratio > 0.0 && pixel_aspect_ratio.is_finite()) {

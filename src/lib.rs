@@ -10,7 +10,7 @@
 //!
 //! | layer | what it knows |
 //! |---|---|
-//! | [`math`], [`error`], [`diagnostics`] | compensated arithmetic; errors; structured warnings |
+//! | [`math`], [`error`], [`diagnostics`], `atomic` | compensated arithmetic; errors; structured warnings; files whole or not at all |
 //! | [`spectrum`] | wavelengths, lines, responses |
 //! | [`optics`] | n(λ) and its derivatives, media and their priorities |
 //! | [`ray`] | columns, transfer, scattering, footprint, chromatic motion: the calculus |
@@ -25,6 +25,7 @@
 //!
 //! Imports go down this table only from its bottom up: a layer knows those above it (`tests/architecture.rs`).
 
+mod atomic;
 pub mod camera;
 pub mod compare;
 pub mod diagnostics;

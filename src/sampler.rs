@@ -43,6 +43,7 @@ fn hash(x: u64) -> u64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact values are the law under test")]
 mod tests {
     use super::*;
 

@@ -6,6 +6,7 @@ use std::path::Path;
 /// From the bottom up. `scene` has never heard of USD, `film` never of files, nobody of Python.
 const LAYERS: &[&[&str]] = &[
     &["error", "diagnostics", "math"],
+    &["atomic"],
     &["spectrum"],
     &["optics"],
     &["ray"],

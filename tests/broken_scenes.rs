@@ -223,3 +223,109 @@ fn hostile_scene_files_get_errors() {
     let missing = file::read(&folder.path().join("no.safetensors"), false).expect_err("read what is not there");
     assert!(missing.to_string().contains("no.safetensors"), "{missing}");
 }
+
+#[test]
+fn whatever_a_material_says_is_compiled_or_refused() {
+    use serde_json::json;
+    let names = [
+        "abbe:glass",
+        "abbe:dispersion:law",
+        "abbe:dispersion:nd",
+        "abbe:dispersion:vd",
+        "abbe:dispersion:cauchy",
+        "abbe:dispersion:sellmeier:b",
+        "abbe:dispersion:sellmeier:c",
+        "abbe:dispersion:formula",
+        "abbe:dispersion:coefficients",
+        "abbe:dispersion:table",
+        "abbe:dispersion:validRange",
+        "abbe:dispersion:scale",
+        "abbe:dielectricPriority",
+        "abbe:dispersion:outOfRange",
+    ];
+    let inputs = [
+        "specular_ior",
+        "ior",
+        "specular_IOR",
+        "transmission",
+        "transmission_weight",
+        "opacity",
+        "opacityMode",
+        "specular_roughness",
+        "roughness",
+        "transmission_dispersion",
+        "transmission_dispersion_scale",
+        "transmission_dispersion_abbe_number",
+        "dispersion",
+        "base_metalness",
+        "metallic",
+        "geometry_thin_walled",
+    ];
+    let ids = [
+        "UsdPreviewSurface",
+        "ND_open_pbr_surface_surfaceshader",
+        "ND_standard_surface_surfaceshader",
+        "ND_gltf_pbr_surfaceshader",
+        "arnold:standard_surface",
+        "Unknown",
+    ];
+    let values = [
+        json!(1.5),
+        json!(0.0),
+        json!(-3.0),
+        json!(1e300),
+        json!(1e-300),
+        json!(64),
+        json!(-1),
+        json!(9),
+        json!("nan"),
+        json!("sellmeier"),
+        json!(""),
+        json!(true),
+        json!([]),
+        json!([1.0]),
+        json!([1.0, 0.01]),
+        json!([0.2, 0.4, 0.3]),
+        json!([[400.0, 1.5], [500.0, 1.4]]),
+        json!(null),
+        json!({"a": 1}),
+        json!([1.5, "x"]),
+        json!(u64::MAX),
+    ];
+    let types = ["float", "double", "double[]", "int", "token", "string", "bool", "color3f"];
+    let mut state = 7u64;
+    let mut pick = |n: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % n
+    };
+    let (mut compiled, mut refused) = (0, 0);
+    for _ in 0..4000 {
+        let mut description = ball().description();
+        let material = &mut description.document.materials[0];
+        material.abbe.clear();
+        for _ in 0..pick(4) {
+            let value = support::authored(types[pick(types.len())], values[pick(values.len())].clone());
+            material.abbe.insert(names[pick(names.len())].into(), value);
+        }
+        let surface = material.surface.as_mut().unwrap();
+        surface.id = ids[pick(ids.len())].into();
+        for _ in 0..pick(4) {
+            let value = support::authored(types[pick(types.len())], values[pick(values.len())].clone());
+            surface.inputs.insert(inputs[pick(inputs.len())].into(), value);
+        }
+        match Scene::build(description) {
+            Ok(scene) => {
+                compiled += 1;
+                // What was accepted can be rendered, and no value of it is not finite.
+                let image =
+                    support::rendered(&scene, &request(6, 4, &["dispersion2", "footprint_half_width", "abbe_number"]));
+                assert_eq!(image.statistics.non_finite_values, 0);
+            }
+            Err(error) => {
+                refused += 1;
+                assert!(error.to_string().trim_start_matches('<').starts_with("/World/Glass"), "{error}");
+            }
+        }
+    }
+    assert!(compiled > 500 && refused > 500, "{compiled} compiled, {refused} refused");
+}

@@ -1,6 +1,8 @@
 //! Laws of the whole renderer: what an AOV claims is true of the renderer's own views at other wavelengths, and nothing
 //! but the scene decides a bit.
 
+#![allow(clippy::float_cmp, reason = "exact values are the law under test")]
+
 mod support;
 
 use abbe::film::aov::AOVS;
@@ -481,6 +483,12 @@ fn a_cancelled_render_keeps_finished_tiles() {
     assert_eq!(image.statistics.pixels, 512);
     let valid = floats(&image.film, "depth").1;
     assert_eq!(valid.iter().filter(|&&v| v == 1.0).count(), 512);
+    // What is missing cannot be merged away.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part.exr");
+    abbe::exr::write(&path, &image.film, &image.metadata).unwrap();
+    let error = abbe::exr::merge(&[path], &folder.path().join("merged.exr")).expect_err("merged an unfinished image");
+    assert!(error.to_string().contains("interrupted"), "{error}");
 }
 
 #[test]
@@ -528,7 +536,8 @@ fn cemented_surfaces_are_both_met_and_a_gap_changes_nothing() {
         for gap in [0.0, 1e-12] {
             with_bench(slabs(gap, priorities), |bench| {
                 let chain = bench.chain::<ScreenColumns>(DVec2::new(20.5, 14.5), NM);
-                assert_eq!(chain.total_reflections, 0);
+                // Cemented faces are one interface; across a gap there are two.
+                assert_eq!((chain.interfaces, chain.total_reflections), (if gap == 0.0 { 3 } else { 4 }, 0));
                 ends.push(chain.columns.lambda().unwrap().point);
             });
         }
@@ -574,4 +583,51 @@ fn analytic_columns_beat_every_difference_and_predictions_improve_with_order() {
     for pair in comparison.predictions.chunks(2) {
         assert!(pair[1].error.median < pair[0].error.median, "{pair:?}");
     }
+}
+
+#[test]
+fn the_headers_matrices_project_positions_to_their_pixels() {
+    use abbe::film::metadata::Attribute;
+    let mut s = prism();
+    s.document.cameras[0].horizontal_aperture_offset = 2.5;
+    s.document.cameras[0].vertical_aperture_offset = -4.0;
+    for projection in ["perspective", "orthographic"] {
+        let mut s = Stagehand { document: s.document.clone(), arrays: s.arrays.clone() };
+        s.document.cameras[0].projection = projection.into();
+        let image = rendered(&s.build(), &request(40, 30, &["position", "depth"]));
+        let matrix = |name: &str| match image.metadata.get(name) {
+            Some(Attribute::Matrix(m)) => m.map(f64::from),
+            other => panic!("{name} is {other:?}"),
+        };
+        let (to_ndc, to_camera) = (matrix("worldToNDC"), matrix("worldToCamera"));
+        let (position, valid) = floats(&image.film, "position");
+        let (depth, _) = floats(&image.film, "depth");
+        for (i, p) in position.chunks(3).enumerate().filter(|(i, _)| valid[*i] > 0.0) {
+            // Row vectors: p' = (p, 1) M.
+            let by = |m: &[f64; 16], column: usize| {
+                (0..3).map(|row| f64::from(p[row]) * m[4 * row + column]).sum::<f64>() + m[12 + column]
+            };
+            let [x, y, w] = [by(&to_ndc, 0), by(&to_ndc, 1), by(&to_ndc, 3)];
+            let pixel = [x / w * 40.0, y / w * 30.0];
+            let expected = [(i % 40) as f64 + 0.5, (i / 40) as f64 + 0.5];
+            assert!((0..2).all(|k| (pixel[k] - expected[k]).abs() < 1e-3), "{projection}: {pixel:?} for {expected:?}");
+            assert!((by(&to_camera, 2) - f64::from(depth[i])).abs() < 1e-4, "+z of the EXR's camera is depth");
+        }
+    }
+}
+
+#[test]
+fn the_half_width_never_reaches_beyond_an_interfaces_critical_wavelength() {
+    with_bench(prism(), |bench| {
+        let image = rendered(bench.scene, &request(48, 32, &["footprint_half_width"]));
+        let (half_width, valid) = floats(&image.film, "footprint_half_width");
+        let mut limited = 0;
+        for i in (0..48 * 32).filter(|&i| valid[i] > 0.0) {
+            let raster = DVec2::new((i % 48) as f64 + 0.5, (i / 48) as f64 + 0.5);
+            let chain = bench.chain::<SecondOrderColumns>(raster, NM);
+            assert!(f64::from(half_width[i]) <= chain.nearest_critical.min(150.0) * (1.0 + 1e-6), "{raster}");
+            limited += usize::from(chain.nearest_critical < 150.0);
+        }
+        assert!(limited > 10, "only {limited} chains come near a critical angle");
+    });
 }

@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 from . import _core
 from .errors import UsageError
 
-__all__ = ["Options", "Plan", "Progress", "Scene", "integrators", "merge", "render", "warning_text"]
+__all__ = ["Options", "Plan", "Progress", "Scene", "counted", "integrators", "merge", "render", "warning_text"]
 
 _log = logging.getLogger("abbe")
 
@@ -105,6 +105,11 @@ def _request(options: Options) -> str:
         except (TypeError, ValueError) as error:
             raise UsageError(f"{name}: {error}: give plain finite numbers, text or lists of them") from None
     return "{" + ",".join(texts) + "}"
+
+
+def counted(count: int, what: str) -> str:
+    """Return ``1 camera``, ``2 cameras``."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def warning_text(warning: Mapping[str, Any]) -> str:
@@ -223,6 +228,19 @@ class Scene:
         """
         self._core.save(Path(path))
 
+    def __repr__(self) -> str:
+        document = self.document
+        parts = [
+            counted(len(document["cameras"]), "camera"),
+            counted(len(document["shapes"]), "shape"),
+            counted(len(document["materials"]), "material"),
+        ]
+        if (time_code := document["stage"].get("time_code")) is not None:
+            parts.append(f"frame {time_code:g}")
+        if self._told:
+            parts.append(counted(len(self._told), "warning"))
+        return f"<abbe.Scene of {Path(document['stage']['source']).name}: {', '.join(parts)}>"
+
     @property
     def document(self) -> dict[str, Any]:
         """The scene description without its arrays, as plain values (a copy)."""
@@ -278,6 +296,27 @@ class Scene:
             There is no such sample, or an option contradicts the scene.
         """
         return self._core.trace(_request(options), 0, pixel, sample)
+
+    def compare(self, *, rounds: int = 5, **options: Unpack[Options]) -> dict[str, Any]:
+        """Measure ways to get a derivative AOV against each other on this scene's own chains.
+
+        Parameters
+        ----------
+        rounds : how often each is timed; ratios are medians over the rounds
+        options : as for :func:`render`; of several products the first counts
+
+        Returns
+        -------
+        dict
+            ``costs`` of the columns (Mray/s, one thread), ``methods`` with time (ns per chain) and relative error of
+            ∂p/∂λ, ``predictions`` of where the ray at λ + δ lands, ``reference_error``, ``chains``.
+
+        Raises
+        ------
+        AbbeError
+            No pixel sees a surface through dispersive glass.
+        """
+        return self._core.compare(_request(options), 0, rounds)
 
     def render(self, *, progress: Callable[[Progress], object] | None = None, **options: Unpack[Options]) -> _core.Film:
         """Render one image.

@@ -7,6 +7,20 @@ from typing import Any, final
 import numpy as np
 import numpy.typing as npt
 
+__all__ = [
+    "Dispersion",
+    "Film",
+    "Scene",
+    "__version__",
+    "aov_aliases",
+    "aovs",
+    "integrators",
+    "merge",
+    "reflect",
+    "refract",
+    "transfer",
+]
+
 __version__: str
 
 _Path = str | PathLike[str]
@@ -45,6 +59,7 @@ class Scene:
     def warnings(self) -> list[dict[str, Any]]: ...
     def plan(self, request: str) -> list[tuple[str, str]]: ...
     def trace(self, request: str, plan_index: int, pixel: tuple[int, int], sample: int = 0) -> dict[str, Any]: ...
+    def compare(self, request: str, plan_index: int = 0, rounds: int = 5) -> dict[str, Any]: ...
     def render(
         self, request: str, plan_index: int = 0, progress: Callable[[int, int], object] | None = None
     ) -> Film: ...

@@ -12,16 +12,22 @@ import numpy as np
 
 from .errors import AbbeError
 
-__all__ = ["ExrImage", "UnreadableImageError", "read_exr"]
+__all__ = ["ExrImage", "NotAnExrError", "UnreadableImageError", "read_exr"]
 
 # Header attribute with the file's layers: a JSON array of {"name", "aov"}.
 LAYERS = "abbe:layers"
 # Layer above the exact sums that a part of a render carries.
 PARTIAL = "abbe_partial."
+# The four bytes that every EXR begins with ("Technical Introduction to OpenEXR", magic number).
+_MAGIC = b"\x76\x2f\x31\x01"
 
 
 class UnreadableImageError(AbbeError):
     """OpenImageIO cannot open or decode the file."""
+
+
+class NotAnExrError(UnreadableImageError):
+    """The file does not begin as an EXR does."""
 
 
 @dataclass
@@ -54,6 +60,10 @@ class ExrImage:
         """Return a header attribute if it is there and is text."""
         value = self.attributes.get(name)
         return value if isinstance(value, str) else None
+
+    def is_ours(self) -> bool:
+        """Tell whether the header has anything that abbe wrote."""
+        return any(name.startswith("abbe:") for name in self.attributes)
 
     def layers(self) -> list[tuple[str, str]]:
         """Return (layer, AOV) pairs in the order they were asked for.
@@ -94,16 +104,25 @@ def read_exr(path: str | os.PathLike[str]) -> ExrImage:
     ------
     FileNotFoundError
         There is no such file.
+    AbbeError
+        OpenImageIO is not installed, or the path is a folder.
+    NotAnExrError
+        The file is something else.
     UnreadableImageError
-        OpenImageIO is not installed, or it cannot open or decode the file.
+        OpenImageIO cannot open or decode the file.
     """
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such file")
+    if path.is_dir():
+        raise AbbeError(f"{path}: is a folder: name an EXR in it")
     try:
         import OpenImageIO as oiio
     except ImportError:
-        raise UnreadableImageError("OpenImageIO cannot be imported: pip install 'abbe[check]'") from None
+        raise AbbeError("OpenImageIO cannot be imported: pip install 'abbe[check]'") from None
+    with path.open("rb") as file:
+        if file.read(len(_MAGIC)) != _MAGIC:
+            raise NotAnExrError(f"{path}: is not an EXR that abbe wrote: it does not begin as an EXR does")
     opened = oiio.ImageInput.open(str(path))
     if opened is None:
         raise UnreadableImageError(f"{path}: OpenImageIO cannot open it: {_one_line(oiio.geterror())}")
@@ -118,19 +137,23 @@ def _read(path: Path, opened: Any) -> ExrImage:
     names = list(spec.channelnames)
     formats = [str(spec.channelformat(i)) for i in range(spec.nchannels)]
     channels: dict[str, np.ndarray] = {}
-    begin = 0
-    while begin < len(names):
-        # Neighbours of one type in one read; ids would lose digits in a common float type.
-        end = begin
-        while end < len(names) and formats[end] == formats[begin]:
-            end += 1
-        pixels = opened.read_image(0, 0, begin, end, formats[begin])
+    # One read per type, each over the channels from the first to the last of that type: a read decodes every block of
+    # the file, and a common float type would cost ids their digits.
+    for kind in sorted(set(formats)):
+        wanted = [i for i, found in enumerate(formats) if found == kind]
+        begin, end = wanted[0], wanted[-1] + 1
+        pixels = opened.read_image(0, 0, begin, end, kind)
         if pixels is None:
             raise UnreadableImageError(f"{path}: OpenImageIO cannot decode it: {_one_line(opened.geterror())}")
         pixels = np.asarray(pixels).reshape(spec.height, spec.width, end - begin)
-        for i in range(begin, end):
-            channels[names[i]] = pixels[:, :, i - begin]
-        begin = end
+        # Planes of their own: whoever looks at one channel should not stride over all others. Row by row, so that the
+        # transposition stays in the cache.
+        planes = np.empty((len(wanted), spec.height, spec.width), pixels.dtype)
+        columns = [i - begin for i in wanted]
+        for row in range(spec.height):
+            planes[:, row] = pixels[row].T[columns]
+        channels.update((names[i], plane) for i, plane in zip(wanted, planes, strict=True))
+    channels = {name: channels[name] for name in names}
     attributes = {attribute.name: attribute.value for attribute in spec.extra_attribs}
     return ExrImage(
         path=path,

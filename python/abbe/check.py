@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ._image import PARTIAL, ExrImage, UnreadableImageError, channel_name, read_exr
+from ._image import PARTIAL, ExrImage, NotAnExrError, UnreadableImageError, channel_name, read_exr
 
 __all__ = ["CheckReport", "Difference", "Failure", "LayerSummary", "check"]
 
@@ -77,15 +77,19 @@ class Failure:
     channel : the channel concerned, or ``None`` for the header or the file
     pixel : first pixel concerned in full-raster coordinates, or ``None``
     count : how many pixels are concerned
+    concerns : what the failure is about where there is no channel: ``header``, or ``file`` for all of it
     """
 
     message: str
     channel: str | None = None
     pixel: tuple[int, int] | None = None
     count: int = 0
+    concerns: str = "header"
 
     def __str__(self) -> str:
-        place = f"channel {self.channel}" if self.channel else "header"
+        if self.concerns == "file":
+            return self.message
+        place = f"channel {self.channel}" if self.channel else self.concerns
         if self.pixel is not None:
             place += f", pixel {self.pixel[0]},{self.pixel[1]}"
         more = f" ({self.count} pixels)" if self.count > 1 else ""
@@ -185,6 +189,10 @@ class CheckReport:
 
     def _lines(self) -> Iterator[str]:
         verdict = "ok" if self.passed else "FAILED"
+        if not self.layers and not self.differences and any(f.concerns == "file" for f in self.failures):
+            # A fault of the whole file says it all.
+            yield from (f"{self.path}: {failure}" for failure in self.failures)
+            return
         if not self.layers and not self.width:
             yield f"{self.path}: {verdict}"
         else:
@@ -243,8 +251,8 @@ def check(
     ------
     FileNotFoundError
         One of the files does not exist.
-    UnreadableImageError
-        The reference cannot be opened, or OpenImageIO is not installed.
+    AbbeError
+        OpenImageIO is not installed, one of the files is no EXR, or the reference cannot be opened.
     """
     report = CheckReport(path=Path(path), against=None if against is None else Path(against))
     for limit in (tolerance, relative_tolerance):
@@ -254,14 +262,23 @@ def check(
     reference = None if against is None else read_exr(against)
     try:
         image = read_exr(path)
+    except NotAnExrError:
+        raise
     except UnreadableImageError as error:
-        report.failures.append(Failure(str(error).removeprefix(f"{path}: ")))
+        report.failures.append(Failure(str(error).removeprefix(f"{path}: "), concerns="file"))
         return report
     report.width, report.height = image.raster[2:]
     (x, y), (width, height) = image.origin, image.size
     report.window = (x, y, x + width, y + height)
     report.compression = image.text("compression") or "unknown compression"
-    _Checker(image, table, report).run()
+    if image.is_ours():
+        _Checker(image, table, report).run()
+    else:
+        # One fault, not all that follow from it.
+        software = image.text("Software")
+        writer = f"by {software}" if software else "by other software"
+        text = f"is not an EXR that abbe wrote: it is {writer}, and its header has no attributes abbe:…"
+        report.failures.append(Failure(text, concerns="file"))
     if reference is not None:
         _compare(image, reference, tolerance, relative_tolerance, report)
     return report

@@ -95,4 +95,7 @@ def examine() -> list[Finding]:
         _schema_finding(),
         _optional("OpenImageIO", "OpenImageIO", "check", "for abbe check", lambda oiio: str(oiio.VERSION_STRING)),
         _optional("Pillow", "PIL", "preview", "for --preview", lambda pil: str(pil.__version__)),
+        _optional(
+            "matplotlib", "matplotlib", "plot", "for abbe bench --plot", lambda matplotlib: str(matplotlib.__version__)
+        ),
     ]

@@ -13,6 +13,10 @@ class StageError(AbbeError):
     """A stage cannot be read or cannot be used; the message begins with the prim path or file."""
 
 
+class NotUsdError(StageError):
+    """The file is none that USD has a reader for."""
+
+
 class UsageError(AbbeError, ValueError):
     """A request that contradicts itself or is not understood; the message begins with the option."""
 

@@ -15,7 +15,7 @@ import colorsys
 import json
 import math
 import os
-import tempfile
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from ._files import replacing
 from ._image import channel_name, read_exr
 from .errors import AbbeError, UsageError
 
@@ -49,8 +50,10 @@ _CHECKER = ((74, 74, 78), (92, 92, 96))
 _CHECK = 8
 _MARGIN, _GAP = 24, 22
 _TILE_WIDTH, _TILE_HEIGHT = 400, 300
-_LEGEND_HEIGHT = 74
+_LEGEND_HEIGHT = 84
 _TITLE, _TEXT, _SMALL = 18, 14, 12
+# From one line of small text, and of the title, to the next.
+_SMALL_STEP, _TITLE_STEP = 16, 26
 
 # What the font that Pillow brings along cannot show.
 _ASCII = str.maketrans(
@@ -123,31 +126,16 @@ def write_preview(
     Raises
     ------
     FileNotFoundError
-        The EXR does not exist, or the directory of ``path`` does not.
+        The EXR does not exist, or the folder of ``path`` does not.
     UsageError
         A layer is not there.
     AbbeError
         The EXR cannot be read, or Pillow is not installed.
     """
-    path = Path(path)
     tiles, title = tiles_of(source, layers=layers, aovs=aovs)
     sheet = contact_sheet(tiles, title=title)
-    if not path.parent.is_dir():
-        raise FileNotFoundError(
-            f"{path}: the directory {path.parent} does not exist: create it, or choose another place"
-        )
-    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as out:
-            sheet.save(out, format="PNG")
-        # mkstemp makes private files; an image has the rights that the user's umask gives.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    with replacing(path) as temporary:
+        sheet.save(temporary, format="PNG")
 
 
 def tiles_of(
@@ -275,18 +263,22 @@ def contact_sheet(tiles: Sequence[Tile], *, title: str = "") -> Any:
     cell_height = _TEXT + 12 + shown[1] + 8 + _LEGEND_HEIGHT
     columns = _columns(len(tiles), cell_width + _GAP, cell_height + _GAP)
     rows = math.ceil(len(tiles) / columns)
-    top = _MARGIN + (_TITLE + 18 if title else 0)
-    size = (
-        2 * _MARGIN + columns * cell_width + (columns - 1) * _GAP,
-        top + rows * (cell_height + _GAP) - _GAP + _MARGIN,
-    )
+    room = columns * cell_width + (columns - 1) * _GAP
+    lines = _wrapped(title, _TITLE, room) if title else []
+    note = "grey checker: no value" if any(_weight(tile) is not None for tile in tiles) else ""
+    # Behind the title where there is room, else below it.
+    note_x = _length(lines[-1], _TITLE) + 24 if lines else 0
+    note_line = len(lines) - 1 if lines else 0
+    if note and lines and note_x + _length(note, _SMALL) > room:
+        note_x, note_line = 0, len(lines)
+    top = _MARGIN + (max(len(lines), note_line + 1) * _TITLE_STEP + 10 if lines or note else 0)
+    size = (2 * _MARGIN + room, top + rows * (cell_height + _GAP) - _GAP + _MARGIN)
     sheet = Image.new("RGB", size, _PAPER)
     canvas = _Canvas(sheet, ImageDraw.Draw(sheet))
-    if title:
-        used = _write(canvas, (_MARGIN, _MARGIN - 4), title, _TITLE, _INK, size[0] - 2 * _MARGIN)
-        if any(_weight(tile) is not None for tile in tiles):
-            at = (_MARGIN + used + 24, _MARGIN)
-            _write(canvas, at, "grey checker: no value", _SMALL, _FAINT, size[0] - _MARGIN - at[0])
+    for i, line in enumerate(lines):
+        _write(canvas, (_MARGIN, _MARGIN - 4 + i * _TITLE_STEP), line, _TITLE, _INK, room)
+    if note:
+        _write(canvas, (_MARGIN + note_x, _MARGIN + note_line * _TITLE_STEP), note, _SMALL, _FAINT, room)
     for index, tile in enumerate(tiles):
         x = _MARGIN + index % columns * (cell_width + _GAP)
         y = top + index // columns * (cell_height + _GAP)
@@ -304,10 +296,14 @@ def contact_sheet(tiles: Sequence[Tile], *, title: str = "") -> Any:
 
 
 def _columns(count: int, width: int, height: int) -> int:
-    """Columns that bring the sheet closest to 16:10."""
-    return min(
-        range(1, count + 1), key=lambda n: abs(math.log(n * width / (math.ceil(count / n) * height) / 1.6)), default=1
-    )
+    """Columns that bring the sheet close to 16:10 and leave few places empty; none of a handful of tiles."""
+
+    def badness(columns: int) -> float:
+        rows = math.ceil(count / columns)
+        # A tenth of the places empty is as bad as a sheet half again as wide.
+        return abs(math.log(columns * width / (rows * height) / 1.6)) + 4 * (1 - count / (columns * rows))
+
+    return min((n for n in range(1, count + 1) if count > 4 or count % n == 0), key=badness)
 
 
 def _shown_size(width: int, height: int) -> tuple[int, int]:
@@ -438,7 +434,7 @@ def _vectors(values: np.ndarray, some: np.ndarray, unit: str) -> _Picture:
         from PIL import Image
 
         # Drawn at four times its size: Pillow does not smooth edges.
-        radius = (_LEGEND_HEIGHT - 16) // 2
+        radius = 29
         at = (np.arange(8 * radius) + 0.5) / (4 * radius) - 1
         x, y = np.meshgrid(at, -at)
         distance = np.hypot(x, y)
@@ -451,9 +447,8 @@ def _vectors(values: np.ndarray, some: np.ndarray, unit: str) -> _Picture:
         _write(canvas, (left + 2 * radius + 4, top + radius), "+x", _SMALL, _FAINT, anchor="lm")
         text, room = left + 2 * radius + 34, box[2] - left - 2 * radius - 34
         _write(canvas, (text, box[1]), f"rim: {scale:.4g} {unit}", _TEXT, _INK, room)
-        _write(canvas, (text, box[1] + 20), "hue: direction; lightness: root of the length", _SMALL, _FAINT, room)
-        _write(canvas, (text, box[1] + 37), "black: 0", _SMALL, _FAINT, room)
-        _write(canvas, (text, box[1] + 54), _saturation(scale, most), _SMALL, _FAINT, room)
+        lines = ("hue: direction; lightness: root of the length; black: 0", _saturation(scale, most))
+        _write_lines(canvas, (text, box[1] + 20), lines, room)
 
     return _Picture(colours, legend)
 
@@ -468,16 +463,23 @@ def _identifiers(tile: Tile) -> _Picture:
 
     def legend(canvas: _Canvas, box: tuple[int, int, int, int]) -> None:
         shown = order[:6]
-        width = (box[2] - box[0]) // 2
-        for slot, i in enumerate(shown):
-            x, y = box[0] + slot % 2 * width, box[1] + slot // 2 * 18
-            canvas.draw.rectangle((x, y + 2, x + 11, y + 13), fill=tuple(round(255 * float(c)) for c in palette[i]))
+        labels = []
+        for i in shown:
             number = int(found[i])
             path = tile.names[number - 1] if number <= len(tile.names) else ""
-            _write(canvas, (x + 17, y), f"{number} {path.rpartition('/')[2]}", _SMALL, _FAINT, width - 24)
+            labels.append(f"{number} {path.rpartition('/')[2]}")
+        # Long names get the whole width if there are few.
+        half = (box[2] - box[0]) // 2
+        abreast = 1 if len(shown) <= 3 and any(_length(label, _SMALL) > half - 24 for label in labels) else 2
+        width = (box[2] - box[0]) // abreast
+        for slot, (i, label) in enumerate(zip(shown, labels, strict=True)):
+            x, y = box[0] + slot % abreast * width, box[1] + slot // abreast * 18
+            canvas.draw.rectangle((x, y + 2, x + 11, y + 13), fill=tuple(round(255 * float(c)) for c in palette[i]))
+            _write(canvas, (x + 17, y), label, _SMALL, _FAINT, width - 24)
         more = len(order) - len(shown)
         notes = [f"and {more} more"] * (more > 0) + ["black: 0, nothing"] * absent
-        _write(canvas, (box[0], box[1] + (len(shown) + 1) // 2 * 18), ", ".join(notes), _SMALL, _FAINT, box[2] - box[0])
+        below = box[1] + math.ceil(len(shown) / abreast) * 18
+        _write(canvas, (box[0], below), ", ".join(notes), _SMALL, _FAINT, box[2] - box[0])
 
     return _Picture(palette[where.reshape(numbers.shape)], legend, blends=False)
 
@@ -499,20 +501,35 @@ def _counts(values: np.ndarray) -> _Picture:
     found = [int(number) for number in np.unique(np.minimum(values, steps))]
 
     def legend(canvas: _Canvas, box: tuple[int, int, int, int]) -> None:
-        x, y = box[0], box[1]
-        for number in found:
-            label = f"{number}+" if number == steps < most else str(number)
-            if x + 52 > box[2]:
-                x, y = box[0], y + 20
-            if y + 20 > box[3]:
-                break
-            canvas.draw.rectangle(
-                (x, y + 1, x + 15, y + 14), fill=tuple(round(255 * float(c)) for c in palette[number]), outline=_FAINT
-            )
-            _write(canvas, (x + 21, y), label, _SMALL, _FAINT)
-            x += 52
+        abreast = (box[2] - box[0]) // 52
+        labels = _count_labels(found, int(values.max()), abreast * ((box[3] - box[1]) // 20), abreast)
+        for slot, (number, label) in enumerate(labels):
+            x, y = box[0] + slot % abreast * 52, box[1] + slot // abreast * 20
+            fill = tuple(round(255 * float(c)) for c in palette[number])
+            canvas.draw.rectangle((x, y + 1, x + 15, y + 14), fill=fill, outline=_FAINT)
+            _write(canvas, (x + 21, y), label, _SMALL, _FAINT, box[2] - x - 21)
 
     return _Picture(palette[np.minimum(values, steps)], legend, blends=False)
+
+
+def _count_labels(found: Sequence[int], most: int, places: int, abreast: int) -> list[tuple[int, str]]:
+    """Steps of the palette and what to call them; the last one stands for all that have no place of their own.
+
+    Parameters
+    ----------
+    found : steps that occur, ascending; the last also stands for all counts above it
+    most : the greatest count
+    places : how many there is room for
+    abreast : how many of them stand in a row
+    """
+    labels = [(number, str(number)) for number in found]
+    if len(found) <= places and found[-1] == most:
+        return labels
+    # That label is longer than others: it stands at the beginning of a row, or where three are left.
+    kept = min(len(found) - 1, places - 1)
+    while kept % abreast > max(abreast - 3, 0):
+        kept -= 1
+    return [*labels[:kept], (found[-1], f"… up to {most}")]
 
 
 def _robust(magnitudes: np.ndarray) -> float:
@@ -577,17 +594,46 @@ def _bar(ramp: Callable[[np.ndarray], np.ndarray], low: float, high: float, note
         middle = 0.5 * (low + high)
         for value, anchor, x in ((low, "la", left), (middle, "ma", (left + right) // 2), (high, "ra", right)):
             _write(canvas, (x, top + 19), f"{value:.4g}", _TEXT, _INK, anchor=anchor)
-        _write(canvas, (left, top + 41), note, _SMALL, _FAINT, right - left)
+        _write_lines(canvas, (left, top + 41), [note], right - left)
 
     return legend
 
 
 def _note(*lines: str) -> Callable[..., None]:
     def legend(canvas: _Canvas, box: tuple[int, int, int, int]) -> None:
-        for i, line in enumerate(lines):
-            _write(canvas, (box[0], box[1] + 2 + 18 * i), line, _SMALL, _FAINT, box[2] - box[0])
+        _write_lines(canvas, (box[0], box[1] + 2), lines, box[2] - box[0])
 
     return legend
+
+
+def _printable(text: str) -> str:
+    return text.translate(_ASCII).encode("ascii", "replace").decode()
+
+
+def _length(text: str, size: int) -> int:
+    """Width of a line in pixels."""
+    from PIL import ImageFont
+
+    return math.ceil(ImageFont.load_default(size).getlength(_printable(text)))
+
+
+def _wrapped(text: str, size: int, room: int) -> list[str]:
+    """The text on as many lines as it needs to be at most ``room`` pixels wide, broken at blanks."""
+    lines: list[str] = []
+    # Blanks that set facts apart stay as they are inside a line.
+    for word in re.findall(r"\s*\S+", text):
+        if lines and _length(lines[-1] + word, size) <= room:
+            lines[-1] += word
+        else:
+            lines.append(word.lstrip())
+    return lines
+
+
+def _write_lines(canvas: _Canvas, at: tuple[int, int], texts: Iterable[str], room: int) -> None:
+    """Write small text, each of ``texts`` on as many lines as it needs."""
+    lines = [line for text in texts for line in _wrapped(text, _SMALL, room)]
+    for i, line in enumerate(lines):
+        _write(canvas, (at[0], at[1] + i * _SMALL_STEP), line, _SMALL, _FAINT, room)
 
 
 def _write(
@@ -603,7 +649,7 @@ def _write(
     from PIL import ImageFont
 
     font = ImageFont.load_default(size)
-    text = text.translate(_ASCII).encode("ascii", "replace").decode()
+    text = _printable(text)
     if room is not None and font.getlength(text) > room:
         while text and font.getlength(text + "...") > room:
             text = text[:-1]

@@ -111,6 +111,22 @@ impl PyScene {
         Ok(json::to_python(py, &events)?)
     }
 
+    /// Ways to get a derivative, measured on one plan's chains in `rounds` rounds.
+    #[pyo3(signature = (request, plan_index = 0, rounds = 5))]
+    fn compare<'py>(
+        &self,
+        py: Python<'py>,
+        request: &str,
+        plan_index: usize,
+        rounds: usize,
+    ) -> Outcome<Bound<'py, PyAny>> {
+        let comparison = released(py, || {
+            let plan = self.plan_at(request, plan_index)?;
+            Ok(abbe::compare::compare(&self.scene, &plan, rounds)?)
+        })?;
+        Ok(json::to_python(py, &comparison)?)
+    }
+
     /// Renders one plan with the interpreter released.
     ///
     /// About ten times a second the calling thread looks for signals and calls ``progress(done, total)`` (pixels). If either

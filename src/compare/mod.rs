@@ -86,7 +86,8 @@ pub struct Cost {
 pub struct Comparison {
     /// Chains that the methods were compared on: dispersive, ending on a surface, the same events at ± the largest step.
     pub chains: usize,
-    /// How well the reference (Richardson extrapolation of re-traces) knows ∂p/∂λ itself: errors below it mean nothing.
+    /// How well the reference (Richardson extrapolation of re-traces) knows ∂p/∂λ itself, rounding included: errors below
+    /// it mean nothing.
     pub reference_error: Errors,
     /// Ways to the derivative.
     pub methods: Vec<Method>,
@@ -133,9 +134,24 @@ impl Tracer<'_> {
         Media::at(self.scene, Wavelength::from_nanometers(nm), self.scale)
     }
 
+    fn logged(&self, start: &RayStart, media: &Media, log: &mut Vec<Step>) -> Chain<NoColumns> {
+        self.follower.follow(start, media, Some(log), &mut Counters::default())
+    }
+
     fn follow<C: ColumnSet>(&self, start: &RayStart, media: &Media) -> Chain<C> {
         self.follower.follow(start, media, None, &mut Counters::default())
     }
+}
+
+/// Two normals further apart than this (18°) belong to different facets; on a smooth surface they would mean a chain far
+/// too curved for any derivative.
+const SAME_FACET: f64 = 0.95;
+
+/// Whether two chains do the same at the same surfaces, so that derivatives of one tell about the other.
+fn are_of_one_family(a: &[Step], b: &[Step]) -> bool {
+    let kind = |step: &Step| step.scattering.map(|s| s.kind);
+    a.len() == b.len()
+        && a.iter().zip(b).all(|(a, b)| kind(a) == kind(b) && a.transfer.n_g.dot(b.transfer.n_g) > SAME_FACET)
 }
 
 fn end<C>(chain: &Chain<C>) -> Option<DVec3> {
@@ -145,15 +161,6 @@ fn end<C>(chain: &Chain<C>) -> Option<DVec3> {
     }
 }
 
-/// What has to be the same for two chains to be of one family.
-fn events<C>(chain: &Chain<C>) -> (u32, u32, Option<u32>) {
-    let instance = match &chain.end {
-        End::Surface(met) => Some(met.hit.instance),
-        End::Miss | End::Exhausted => None,
-    };
-    (chain.interfaces, chain.total_reflections, instance)
-}
-
 /// A chain to compare on.
 struct Case {
     start: RayStart,
@@ -161,18 +168,23 @@ struct Case {
 }
 
 /// The chains, and how well their reference is known: central differences at h, h/2 and h/4, extrapolated twice
-/// (Richardson 1911), against the extrapolation without the last step.
+/// (Richardson 1911). What the two first extrapolations differ by bounds both the truncation and the rounding left in it.
 fn cases(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart]) -> Result<(Vec<Case>, Errors)> {
     let media = tracer.media(nm)?;
     let steps = [REFERENCE_STEP, REFERENCE_STEP / 2.0, REFERENCE_STEP / 4.0];
     let around = |h: f64| Ok::<_, Error>((tracer.media(nm + h)?, tracer.media(nm - h)?));
     let sides = steps.iter().map(|&h| around(h)).collect::<Result<Vec<_>>>()?;
     let far = around(STEPS[0])?;
+    let mut logs = [Vec::new(), Vec::new()];
     let candidates: Vec<&RayStart> = starts
         .iter()
         .filter(|start| {
-            let chain = tracer.follow::<NoColumns>(start, &media);
-            let same = |media| events(&tracer.follow::<NoColumns>(start, media)) == events(&chain);
+            let [here, there] = &mut logs;
+            let chain = tracer.logged(start, &media, here);
+            let mut same = |media| {
+                tracer.logged(start, media, there);
+                are_of_one_family(here, there)
+            };
             chain.is_dispersive && end(&chain).is_some() && same(&far.0) && same(&far.1)
         })
         .collect();
@@ -188,7 +200,7 @@ fn cases(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart]) -> Result<(Vec<Case>
         let (ab, bc) = ((4.0 * b - a) / 3.0, (4.0 * c - b) / 3.0);
         let truth = (16.0 * bc - ab) / 15.0;
         if truth.length() > 0.0 {
-            uncertainties.push((truth - bc).length() / truth.length());
+            uncertainties.push((ab - bc).length() / truth.length());
             cases.push(Case { start: *start, truth });
         }
     }
@@ -217,10 +229,8 @@ type Derivative<'a> = Box<dyn FnMut(&RayStart) -> Option<DVec3> + 'a>;
 
 fn methods(tracer: &Tracer<'_>, nm: f64, cases: &[Case], rounds: usize) -> Result<Vec<Method>> {
     let media = &tracer.media(nm)?;
-    let sides = STEPS
-        .iter()
-        .map(|&h| Ok((h, tracer.media(nm + h)?, tracer.media(nm - h)?)))
-        .collect::<Result<Vec<_>>>()?;
+    let sides =
+        STEPS.iter().map(|&h| Ok((h, tracer.media(nm + h)?, tracer.media(nm - h)?))).collect::<Result<Vec<_>>>()?;
     let mut ways: Vec<(String, Option<f64>, Derivative<'_>)> = vec![
         (
             "chain alone".into(),
@@ -291,15 +301,8 @@ fn methods(tracer: &Tracer<'_>, nm: f64, cases: &[Case], rounds: usize) -> Resul
 
 fn predictions(tracer: &Tracer<'_>, nm: f64, cases: &[Case]) -> Result<Vec<Prediction>> {
     let media = tracer.media(nm)?;
-    let mut log = Vec::new();
-    let mut known = Vec::new();
-    for case in cases {
-        let chain: Chain<NoColumns> =
-            tracer.follower.follow(&case.start, &media, Some(&mut log), &mut Counters::default());
-        let medium = tracer.follower.start_medium(&media);
-        let along = second_order_along(&case.start, &medium, DVec3::Z, &log);
-        known.push((events(&chain), end(&chain), along));
-    }
+    let medium = tracer.follower.start_medium(&media);
+    let [mut here, mut there] = [Vec::new(), Vec::new()];
     let mut rows = Vec::new();
     for delta in DISTANCES {
         if !(crate::spectrum::SHORTEST.nanometers()..=crate::spectrum::LONGEST.nanometers()).contains(&(nm + delta)) {
@@ -307,12 +310,15 @@ fn predictions(tracer: &Tracer<'_>, nm: f64, cases: &[Case]) -> Result<Vec<Predi
         }
         let shifted = tracer.media(nm + delta)?;
         let mut errors = [Vec::new(), Vec::new()];
-        for (case, (events_here, here, along)) in cases.iter().zip(&known) {
-            let there = tracer.follow::<NoColumns>(&case.start, &shifted);
-            let (Some(here), Some(exact), true) = (*here, end(&there), events(&there) == *events_here) else { continue };
+        for case in cases {
+            let start = &case.start;
+            let from = end(&tracer.logged(start, &media, &mut here));
+            let to = end(&tracer.logged(start, &shifted, &mut there));
+            let (Some(from), Some(to), true) = (from, to, are_of_one_family(&here, &there)) else { continue };
+            let along = second_order_along(start, &medium, DVec3::Z, &here);
             let first = along.point * delta;
             let second = first + along.point2 * (0.5 * delta * delta);
-            let moved = exact - here;
+            let moved = to - from;
             for (errors, predicted) in errors.iter_mut().zip([first, second]) {
                 errors.push((predicted - moved).length() / moved.length());
             }
@@ -343,7 +349,8 @@ fn costs(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart], rounds: usize) -> Re
         let medium = tracer.follower.start_medium(&media);
         let begin = Instant::now();
         for start in starts {
-            let chain = tracer.follower.follow::<ScreenColumns>(black_box(start), &media, Some(&mut log), &mut counters);
+            let chain =
+                tracer.follower.follow::<ScreenColumns>(black_box(start), &media, Some(&mut log), &mut counters);
             if chain.is_dispersive {
                 black_box(second_order_along(start, &medium, DVec3::ONE, &log));
             }
@@ -359,15 +366,14 @@ fn costs(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart], rounds: usize) -> Re
     ];
     let mut times = vec![Vec::new(); passes.len()];
     let mut rays = 0;
-    for _ in 0..=rounds {
+    passes[0].1(); // warms up
+    for _ in 0..rounds {
         for ((_, pass), times) in passes.iter().zip(&mut times) {
             let (seconds, cast) = pass();
             times.push(seconds);
             rays = cast;
         }
     }
-    // The first round warms up.
-    times.iter_mut().for_each(|times| drop(times.remove(0)));
     let bare = times[0].clone();
     let row = |((name, _), times): (&(&str, Pass<'_>), Vec<f64>)| Cost {
         columns: (*name).to_owned(),

@@ -18,16 +18,8 @@ use crate::film::sum::{TreeSum, is_aligned, mean, valid_fraction};
 use crate::film::{Film, Layer, SampleRange, Sums, Values, Window};
 
 /// Attributes that tell of a part, not of the render: they may differ between parts and the result does not have them.
-pub const PER_PART: &[&str] = &[
-    "abbe:commandLine",
-    "abbe:complete",
-    "abbe:crop",
-    "abbe:renderTime",
-    "abbe:statistics",
-    "abbe:threads",
-    "abbe:window",
-    "capDate",
-];
+pub const PER_PART: &[&str] =
+    &["abbe:commandLine", "abbe:crop", "abbe:renderTime", "abbe:statistics", "abbe:threads", "abbe:window", "capDate"];
 
 /// One input.
 struct Part {
@@ -90,6 +82,9 @@ pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<()> {
 
 fn open(path: &Path) -> Result<Part> {
     let reader = Reader::open(path)?;
+    if reader.metadata().get("abbe:complete") == Some(&Attribute::Int(0)) {
+        return Err(Error::file(path, "was interrupted, so pixels are missing in it: render it again"));
+    }
     let Head { window, samples, ref layers, .. } = *reader.head();
     let mut means = layers.iter().filter(|layer| layer.aov.merge == Merge::Mean).peekable();
     let has_sums =

@@ -3,7 +3,7 @@
 //! One film is one file: single-part scan lines, channels `layer.X`, one compression. Everything but ids and counts is
 //! FLOAT; these are UINT. `<layer>.valid` stands beside a layer that can lack values; `depth` is there a second time as
 //! the bare `Z` that compositors look for. A render of a part of its samples also carries the exact sums behind its
-//! means ([`layout`]), which lets [`merge`] join parts to the bits of one render.
+//! means ([`layout`]), which lets [`merge()`] join parts to the bits of one render.
 //!
 //! The same film and metadata give the same bytes: attributes and channels are sorted, nothing depends on time or
 //! threads. Pixel compression is the `exr` crate's; the file frame is written and read here, because that crate keeps
@@ -11,7 +11,6 @@
 //!
 //! Sources: OpenEXR, *File Layout* and `ImfStandardAttributes.h` (3.4).
 
-mod atomic;
 mod header;
 pub mod layout;
 mod merge;
@@ -68,9 +67,9 @@ pub fn write(path: &Path, film: &Film, metadata: &Metadata) -> Result<()> {
     writer::write_bands(path, &Head::of(film), metadata, |_| Ok(Cow::Borrowed(film)))
 }
 
-/// Reads a file that [`write`] or [`merge`] wrote.
+/// Reads a file that [`write()`] or [`merge()`] wrote.
 ///
-/// Metadata come back sorted by name, without the attributes that [`write`] adds by itself.
+/// Metadata come back sorted by name, without the attributes that [`write()`] adds by itself.
 /// Anything else, damaged files included, is an error; memory stays in proportion to the file's size.
 pub fn read(path: &Path) -> Result<(Film, Metadata)> {
     let mut reader = Reader::open(path)?;

@@ -12,7 +12,8 @@ use rayon::prelude::*;
 
 use super::header::Encoded;
 use super::layout::Channel;
-use super::{Head, atomic, header, layout};
+use super::{Head, header, layout};
+use crate::atomic;
 use crate::error::{Error, Result};
 use crate::film::aov::SampleType;
 use crate::film::metadata::Metadata;

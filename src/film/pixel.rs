@@ -1,7 +1,7 @@
 //! One pixel in the making: samples go in by their index, a finished value per layer comes out.
 
 use super::aov::{Aov, Merge};
-use super::sum::TreeSum;
+use super::sum::{self, TreeSum};
 use super::{Layer, SampleRange, Values};
 
 /// Collects the samples of one pixel for all layers; used again for the next pixel.
@@ -78,15 +78,16 @@ impl PixelAccumulator {
             match (slot, &mut layer.values) {
                 (Slot::Mean { sums, valid }, Values::Float(values)) => {
                     let channels = sums.len();
-                    let mut totals = sums.iter().map(TreeSum::total);
+                    let range = pixel * channels..(pixel + 1) * channels;
+                    for (sum, value) in sums.iter().zip(&mut values[range.clone()]) {
+                        *value = sum::mean(sum.total(), *valid);
+                    }
+                    if let Some(fraction) = &mut layer.valid {
+                        fraction[pixel] = sum::valid_fraction(*valid, self.samples.end - self.samples.begin);
+                    }
                     if let Some(kept) = &mut layer.sums {
                         kept.counts[pixel] = *valid;
-                        kept.values[pixel * channels..][..channels].fill_with(|| totals.next().unwrap_or(0.0));
-                        totals = sums.iter().map(TreeSum::total);
-                    }
-                    mean(totals, *valid, &mut values[pixel * channels..][..channels]);
-                    if let Some(fraction) = &mut layer.valid {
-                        fraction[pixel] = valid_fraction(*valid, self.samples.end - self.samples.begin);
+                        kept.values[range].iter_mut().zip(sums).for_each(|(kept, sum)| *kept = sum.total());
                     }
                 }
                 (Slot::First { value }, Values::Uint(values)) => values[pixel] = value.unwrap_or(0),
@@ -94,18 +95,6 @@ impl PixelAccumulator {
             }
         }
     }
-}
-
-/// The mean of sums over `valid` samples; 0 where there are none.
-pub fn mean(sums: impl Iterator<Item = f64>, valid: u32, out: &mut [f32]) {
-    for (out, sum) in out.iter_mut().zip(sums) {
-        *out = if valid == 0 { 0.0 } else { (sum / f64::from(valid)) as f32 };
-    }
-}
-
-/// The fraction of samples with a value.
-pub fn valid_fraction(valid: u32, samples: u32) -> f32 {
-    (f64::from(valid) / f64::from(samples)) as f32
 }
 
 #[cfg(test)]

@@ -7,9 +7,12 @@ use glam::DVec3;
 use super::mesh::{Mesh, MeshHit};
 use super::placed::{ObjectRay, Placed};
 use super::start::{Met, Relation, Start, behind, relation};
-use super::tree::Tree;
+use super::tree::{Bounds, Tree};
 use super::{Departures, Hit, Instance, Ray, Shape};
 use crate::ray::LocalSurface;
+
+/// Above this number of members [`Aggregate::touching`] would take longer than what it saves.
+const MANY: usize = 4096;
 
 /// Everything that rays can meet.
 #[derive(Debug)]
@@ -103,6 +106,34 @@ impl Aggregate {
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let all = self.placed.iter().filter_map(Placed::bounds).reduce(|a, b| a.union(&b))?;
         Some([all.min, all.max])
+    }
+
+    /// For each instance that `is_member`, whether its bounds meet those of another member: only then can their surfaces
+    /// coincide. More than 4096 members are not compared, and count as touching.
+    pub fn touching(&self, is_member: impl Fn(u32) -> bool) -> Vec<bool> {
+        let mut touching = vec![false; self.placed.len()];
+        let members: Vec<(usize, Bounds)> = (0..self.placed.len())
+            .filter(|&i| is_member(i as u32))
+            .filter_map(|i| Some((i, self.placed[i].bounds()?)))
+            .collect();
+        if members.len() > MANY {
+            members.iter().for_each(|&(i, _)| touching[i] = true);
+            return touching;
+        }
+        // Surfaces that coincide under different transforms differ by rounding of their coordinates.
+        let meet = |a: &Bounds, b: &Bounds| {
+            let reach = a.min.abs().max(a.max.abs()).max(b.min.abs()).max(b.max.abs());
+            let margin = reach.max_element() * self.spread * 2f64.powi(-46);
+            a.min.cmple(b.max + margin).all() && b.min.cmple(a.max + margin).all()
+        };
+        for (k, (i, a)) in members.iter().enumerate() {
+            for (j, b) in &members[k + 1..] {
+                if !(touching[*i] && touching[*j]) && meet(a, b) {
+                    (touching[*i], touching[*j]) = (true, true);
+                }
+            }
+        }
+        touching
     }
 
     /// What `intersect` finds by asking every primitive: the law that trees are tested against.

@@ -197,9 +197,11 @@ impl Mesh {
         mut found: impl FnMut(MeshHit) -> f64,
     ) {
         let sheared = ShearedRay::new(origin, direction);
+        let points = self.points.as_slice();
         let from = start.map_or(0.0, |start| -behind(start.magnitude));
         self.tree.walk(origin, direction, from, limit, 1.0, |primitive, limit| {
-            let Some(hit) = sheared.intersect(self.corners_f32(primitive)) else { return limit };
+            let corners = self.triangles[primitive as usize].map(|p| &points[p as usize]);
+            let Some(hit) = sheared.intersect(corners) else { return limit };
             let (distance, at_start) = match start {
                 None if hit.distance > 0.0 => (hit.distance, false),
                 None => return limit,
@@ -220,7 +222,8 @@ impl Mesh {
     pub(super) fn every_crossing(&self, origin: DVec3, direction: DVec3, mut found: impl FnMut(MeshHit)) {
         let sheared = ShearedRay::new(origin, direction);
         for primitive in 0..self.triangles.len() as u32 {
-            if let Some(TriangleHit { distance, barycentric, leaving }) = sheared.intersect(self.corners_f32(primitive))
+            if let Some(TriangleHit { distance, barycentric, leaving }) =
+                sheared.intersect(self.corners_f32(primitive).each_ref())
                 && distance > 0.0
             {
                 found(MeshHit { primitive, distance, barycentric, leaving, at_start: false });
@@ -229,7 +232,8 @@ impl Mesh {
     }
 
     fn corners_f32(&self, primitive: u32) -> [[f32; 3]; 3] {
-        self.triangles[primitive as usize].map(|p| self.points[p as usize])
+        let points = self.points.as_slice();
+        self.triangles[primitive as usize].map(|p| points[p as usize])
     }
 
     /// Drops normals that say nothing, and finds out which way the others point.

@@ -24,7 +24,12 @@ const REINSERTION: f32 = 0.02;
 
 /// Deepest four-wide tree that a traversal can hold: three children wait at every level.
 const MAX_DEPTH: usize = 32;
-pub(super) const STACK: usize = 3 * MAX_DEPTH + 4;
+pub(super) const STACK: usize = stack_of(MAX_DEPTH);
+
+/// What a traversal of a tree with so many levels holds at most.
+pub(super) const fn stack_of(depth: usize) -> usize {
+    3 * depth + 4
+}
 
 /// Four children: bounds lane by lane, and where they are.
 #[derive(Clone, Copy, Debug)]
@@ -59,6 +64,8 @@ pub(crate) struct Tree {
     pub(super) nodes: Vec<Node>,
     /// Primitives, leaf after leaf.
     pub(super) order: Vec<u32>,
+    /// What a traversal holds at most.
+    pub(super) stack: usize,
     /// A power of two: from the caller's units to those of the boxes.
     pub(super) scale: f64,
     /// Bounds of everything, scaled.
@@ -100,14 +107,14 @@ impl Tree {
             })
             .collect();
         let binary = agglomerate(&boxes);
-        let (nodes, order) = match widen(&binary.nodes) {
-            Some(nodes) => (nodes, binary.primitive_indices),
+        let ((nodes, depth), order) = match widen(&binary.nodes) {
+            Some(wide) => (wide, binary.primitive_indices),
             None => {
                 let (binary, order) = halve(&boxes);
                 (widen(&binary).expect("halving 2^31 primitives takes 31 binary levels"), order)
             }
         };
-        Self { nodes, order, scale, bounds: [all.min * scale, all.max * scale] }
+        Self { nodes, order, stack: stack_of(depth), scale, bounds: [all.min * scale, all.max * scale] }
     }
 }
 
@@ -157,15 +164,17 @@ fn halve(boxes: &[Aabb]) -> (Vec<Bvh2Node>, Vec<u32>) {
     (nodes, order)
 }
 
-/// Four-wide nodes from a binary tree: each takes in the largest of its children until it has four. `None` if the result
-/// is deeper than a traversal can hold.
-fn widen(binary: &[Bvh2Node]) -> Option<Vec<Node>> {
+/// Four-wide nodes from a binary tree, and their levels: each node takes in the largest of its children until it has four.
+/// `None` if the result is deeper than a traversal can hold.
+fn widen(binary: &[Bvh2Node]) -> Option<(Vec<Node>, usize)> {
     let mut nodes = vec![Node::EMPTY];
+    let mut deepest = 1;
     let mut open = vec![(0_u32, 0_usize, 1_usize)];
     while let Some((root, node, depth)) = open.pop() {
         if depth > MAX_DEPTH {
             return None;
         }
+        deepest = deepest.max(depth);
         let mut children = [root; 4];
         let mut len = 1;
         while len < 4 {
@@ -195,7 +204,7 @@ fn widen(binary: &[Bvh2Node]) -> Option<Vec<Node>> {
             }
         }
     }
-    Some(nodes)
+    Some((nodes, deepest))
 }
 
 /// The largest f32 vector not above `v`.

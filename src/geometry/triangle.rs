@@ -16,11 +16,20 @@ use glam::{DVec2, DVec3};
 /// A ray prepared for triangles in its own space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShearedRay {
+    /// In the order of `axes`.
     origin: DVec3,
     /// Axes that become x, y, z; z is the largest component of the direction, handedness is kept.
-    axes: [usize; 3],
+    axes: [Axis; 3],
     shear: DVec2,
     per_z: f64,
+}
+
+/// An index below 3, so that nobody checks it again.
+#[derive(Clone, Copy, Debug)]
+enum Axis {
+    X,
+    Y,
+    Z,
 }
 
 /// A triangle that the line of the ray crosses.
@@ -37,48 +46,47 @@ pub(crate) struct TriangleHit {
 impl ShearedRay {
     pub(crate) fn new(origin: DVec3, direction: DVec3) -> Self {
         let size = direction.abs();
-        let z = if size.x >= size.y && size.x >= size.z {
-            0
+        let [mut x, mut y, z] = if size.x >= size.y && size.x >= size.z {
+            [Axis::Y, Axis::Z, Axis::X]
         } else if size.y >= size.z {
-            1
+            [Axis::Z, Axis::X, Axis::Y]
         } else {
-            2
+            [Axis::X, Axis::Y, Axis::Z]
         };
-        let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
-        if direction[z] < 0.0 {
+        let (from, along) = (origin.to_array(), direction.to_array());
+        if along[z as usize] < 0.0 {
             std::mem::swap(&mut x, &mut y);
         }
-        let per_z = 1.0 / direction[z];
-        Self { origin, axes: [x, y, z], shear: DVec2::new(direction[x] * per_z, direction[y] * per_z), per_z }
+        let per_z = 1.0 / along[z as usize];
+        let shear = DVec2::new(along[x as usize] * per_z, along[y as usize] * per_z);
+        let origin = DVec3::new(from[x as usize], from[y as usize], from[z as usize]);
+        Self { origin, axes: [x, y, z], shear, per_z }
     }
 
     /// The corner in the sheared frame; z is the distance along the ray.
     #[inline(always)]
-    fn project(&self, p: [f32; 3]) -> (DVec2, f64) {
-        let [x, y, z] = self.axes;
-        let height = f64::from(p[z]) - self.origin[z];
-        let across = DVec2::new(f64::from(p[x]) - self.origin[x], f64::from(p[y]) - self.origin[y]);
+    fn project(&self, p: &[f32; 3]) -> (DVec2, f64) {
+        let [x, y, z] = self.axes.map(|axis| f64::from(p[axis as usize]));
+        let height = z - self.origin.z;
+        let across = DVec2::new(x - self.origin.x, y - self.origin.y);
         (across - self.shear * height, height * self.per_z)
     }
 
     /// The crossing of the ray's line with a triangle.
     #[inline]
-    pub(crate) fn intersect(&self, corners: [[f32; 3]; 3]) -> Option<TriangleHit> {
+    pub(crate) fn intersect(&self, corners: [&[f32; 3]; 3]) -> Option<TriangleHit> {
         let (a, az) = self.project(corners[0]);
         let (b, bz) = self.project(corners[1]);
         let (c, cz) = self.project(corners[2]);
-        let u = edge(b, c);
-        let v = edge(c, a);
-        let w = edge(a, b);
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+        let mut edges = [edge(b, c), edge(c, a), edge(a, b)];
+        // Most candidates end here; exact tails cannot bring them back, for they only move edges that are 0.
+        if are_mixed(edges) {
             return None;
         }
-        if u == 0.0 || v == 0.0 || w == 0.0 {
-            let side = displaced_sign(u, b, c);
-            if side == 0 || displaced_sign(v, c, a) != side || displaced_sign(w, a, b) != side {
-                return None;
-            }
+        if edges.contains(&0.0) {
+            edges = settle(edges, [a, b, c])?;
         }
+        let [u, v, w] = edges;
         let det = u + v + w;
         // Only a triangle seen exactly from its edge has no area now.
         if det == 0.0 {
@@ -89,23 +97,46 @@ impl ShearedRay {
     }
 }
 
-/// Twice the area of (0, a, b): the sign is that of the exact value. Exactly antisymmetric.
+/// Twice the area of (0, a, b): the sign is that of the exact value, or 0. Exactly antisymmetric.
 #[inline(always)]
 fn edge(a: DVec2, b: DVec2) -> f64 {
-    let (p, q) = (a.x * b.y, a.y * b.x);
-    let difference = p - q;
-    if difference == 0.0 { edge_tail(a, b, p, q) } else { difference }
+    a.x * b.y - a.y * b.x
 }
 
-/// p and q are equal: what is left is the difference of what their rounding cut off.
+/// Whether the ray passes on different sides of the edges. No branches: each sign would be a coin toss.
+#[inline(always)]
+fn are_mixed([u, v, w]: [f64; 3]) -> bool {
+    ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0))
+}
+
+/// Edge functions with exact signs, if those and the displacement where they are 0 say that the triangle is crossed.
 #[cold]
-fn edge_tail(a: DVec2, b: DVec2, p: f64, q: f64) -> f64 {
+fn settle(mut edges: [f64; 3], [a, b, c]: [DVec2; 3]) -> Option<[f64; 3]> {
+    let ends = [(b, c), (c, a), (a, b)];
+    for (edge, (a, b)) in edges.iter_mut().zip(ends) {
+        if *edge == 0.0 {
+            *edge = edge_tail(a, b);
+        }
+    }
+    if are_mixed(edges) {
+        return None;
+    }
+    if edges.contains(&0.0) {
+        let [u, v, w] = [0, 1, 2].map(|i| displaced_sign(edges[i], ends[i].0, ends[i].1));
+        if u == 0 || v != u || w != u {
+            return None;
+        }
+    }
+    Some(edges)
+}
+
+/// The products are equal when rounded: what is left is the difference of what their rounding cut off.
+fn edge_tail(a: DVec2, b: DVec2) -> f64 {
     // `mul_add` is slow without FMA hardware, and rare.
-    a.x.mul_add(b.y, -p) - a.y.mul_add(b.x, -q)
+    a.x.mul_add(b.y, -(a.x * b.y)) - a.y.mul_add(b.x, -(a.y * b.x))
 }
 
 /// Sign of the edge function at the point (ε, ε²): e − ε (b.y − a.y) + ε² (b.x − a.x).
-#[cold]
 fn displaced_sign(e: f64, a: DVec2, b: DVec2) -> i8 {
     for term in [e, a.y - b.y, b.x - a.x] {
         if term != 0.0 {
@@ -116,11 +147,12 @@ fn displaced_sign(e: f64, a: DVec2, b: DVec2) -> i8 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact values are the law under test")]
 mod tests {
     use super::*;
 
     fn hit(origin: [f64; 3], direction: [f64; 3], corners: [[f32; 3]; 3]) -> Option<TriangleHit> {
-        ShearedRay::new(origin.into(), direction.into()).intersect(corners)
+        ShearedRay::new(origin.into(), direction.into()).intersect(corners.each_ref())
     }
 
     const FACE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];

@@ -6,21 +6,27 @@
 //! * The origin. It is moved in f64 to where the ray enters the bounds of everything, so it is ≤ 1 in size before it is
 //!   rounded. The move errs by a few 2^-53 (|o| + 1), as does the shape test, which works with the origin as given: 2^-49
 //!   (|o| + 1) bounds both, times the caller's `spread` where the shape test has its own space. The padded origin is
-//!   rounded up for the near planes of positive directions and far planes of negative ones, down for the others.
+//!   rounded up for the near planes of positive directions and far planes of negative ones, down for the others, each by
+//!   a whole step of f32 so that no rounding needs to be looked at; what underflows, the padding covers.
 //! * The direction. Components below 2^-64 are replaced by ±2^-64, so that 1/d is finite and 0·∞ cannot arise; over a
 //!   distance of 4, more than the diagonal, that moves the ray by 2^-62, which the padding of 2^-40 covers.
 //! * The distances. 1/d, the difference and the product err by 2^-24 relatively, together (1 + 2^-24)^3: multiplying far
-//!   distances by 1 + 2^-21 covers both sides of the comparison (Ize 2013, "Robust BVH ray traversal", JCGT 2(2)).
+//!   distances by 1 + 2^-21 covers both sides of the comparison and the rounding of the limit (Ize 2013, "Robust BVH ray traversal", JCGT 2(2)).
 //!   The relative error cannot change a sign, and distances below 0 are behind the start.
 
 use glam::{DVec3, Vec4};
 
-use super::tree::{Node, STACK, Tree, round_down, round_up};
+use super::tree::{Node, STACK, Tree, stack_of};
 
 const SMALLEST_DIRECTION: f64 = 1.0 / 18_446_744_073_709_551_616.0;
 const PADDING: f64 = 1.0 / 1_099_511_627_776.0;
 const RELATIVE_PADDING: f64 = 1.0 / 562_949_953_421_312.0;
 const FAR_FACTOR: f64 = 1.0 + 1.0 / 2_097_152.0;
+/// 2^-23: moves any f64 by more than its rounding to f32 does.
+const F32_STEP: f64 = 1.0 / 8_388_608.0;
+
+/// Entries of a stack for trees of eight levels, a few hundred to some thousand primitives.
+const SHALLOW: usize = stack_of(8);
 
 /// What waits on the stack: a node (`count` 0) or a leaf, and where the ray enters it.
 #[derive(Clone, Copy)]
@@ -52,6 +58,24 @@ impl Tree {
         start: f64,
         limit: f64,
         spread: f64,
+        visit: impl FnMut(u32, f64) -> f64,
+    ) {
+        // Most trees are shallow, and clearing a stack that is never used takes longer than a step.
+        if self.stack <= SHALLOW {
+            self.walk_with::<SHALLOW>(origin, direction, start, limit, spread, visit);
+        } else {
+            self.walk_with::<STACK>(origin, direction, start, limit, spread, visit);
+        }
+    }
+
+    #[inline(always)]
+    fn walk_with<const STACK: usize>(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        start: f64,
+        limit: f64,
+        spread: f64,
         mut visit: impl FnMut(u32, f64) -> f64,
     ) {
         if self.nodes.is_empty() {
@@ -60,9 +84,8 @@ impl Tree {
         let scale = self.scale;
         let origin = origin * scale;
         let padding = PADDING + RELATIVE_PADDING * spread * (origin.abs().max_element() + 1.0);
-        let direction = DVec3::from_array(
-            direction.to_array().map(|d| if d.abs() < SMALLEST_DIRECTION { SMALLEST_DIRECTION.copysign(d) } else { d }),
-        );
+        let sized = |d: f64| if d.abs() < SMALLEST_DIRECTION { SMALLEST_DIRECTION.copysign(d) } else { d };
+        let direction = DVec3::new(sized(direction.x), sized(direction.y), sized(direction.z));
         let inverse = direction.recip();
         let to_min = (self.bounds[0] - padding - origin) * inverse;
         let to_max = (self.bounds[1] + padding - origin) * inverse;
@@ -73,7 +96,8 @@ impl Tree {
             return;
         }
         let moved = origin + direction * enter;
-        let (low, high) = (round_down(moved - padding), round_up(moved + padding));
+        let (low, high) = (moved - padding, moved + padding);
+        let (low, high) = ((low - low.abs() * F32_STEP).as_vec3(), (high + high.abs() * F32_STEP).as_vec3());
         let mut slabs = Slabs {
             negative: [0; 3],
             inverse: [Vec4::ZERO; 3],
@@ -88,8 +112,8 @@ impl Tree {
             slabs.near_origin[axis] = Vec4::splat(near[axis]);
             slabs.far_origin[axis] = Vec4::splat(far[axis]);
         }
-        // Distances from the moved origin, rounded up.
-        let reach = |limit: f64| round_up(DVec3::splat((limit * scale - enter) * FAR_FACTOR + padding)).x;
+        // Distances from the moved origin.
+        let reach = |limit: f64| ((limit * scale - enter) * FAR_FACTOR + padding) as f32;
         let mut farthest = reach(limit);
 
         let mut stack = [Waiting { near: 0.0, first: 0, count: 0 }; STACK];
@@ -111,19 +135,23 @@ impl Tree {
             let node = &self.nodes[item.first as usize];
             let (near, mut lanes) = slabs.entries(node, farthest);
             // Insertion sort of at most four, farthest deepest on the stack.
-            let base = len;
+            let Some(waiting) = stack[len..].first_chunk_mut::<4>() else {
+                unreachable!("the tree says how deep it is")
+            };
+            let mut added = 0;
             while lanes != 0 {
                 let lane = (lanes.trailing_zeros() & 3) as usize;
                 lanes &= lanes - 1;
                 let new = Waiting { near: near[lane], first: node.first[lane], count: node.count[lane] };
-                let mut at = len;
-                while at > base && stack[at - 1].near < new.near {
-                    stack[at] = stack[at - 1];
+                let mut at = added;
+                while at > 0 && waiting[(at - 1) & 3].near < new.near {
+                    waiting[at & 3] = waiting[(at - 1) & 3];
                     at -= 1;
                 }
-                stack[at] = new;
-                len += 1;
+                waiting[at & 3] = new;
+                added += 1;
             }
+            len += added;
         }
     }
 }

@@ -8,17 +8,20 @@ use glam::DVec3;
 
 use crate::geometry::{Departures, Hit, Ray};
 use crate::optics::IorJet;
-use crate::optics::media::{Inside, MediaStack};
+use crate::optics::media::MediaStack;
 use crate::ray::{ColumnSet, LocalSurface, RayStart, ScatterKind, Scattering, Step, Transfer};
 use crate::ray::{critical_distance, mirror, refract_or_reflect};
 use crate::scene::material::Kind;
 use crate::scene::view::{Media, View};
 
-/// A chain with more events than this has no end.
+/// A chain that would have more events than this has no end.
 pub const MAX_EVENTS: u32 = 64;
 
 /// Straight crossings (cut-outs, surfaces inside a medium of higher priority) that one chain may make.
 const MAX_CROSSINGS: u32 = 4096;
+
+/// Coincident surfaces that are taken together; more are met one by one.
+const MAX_COINCIDENT: u32 = 8;
 
 /// A point on a surface, as a ray met it.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +37,7 @@ pub struct SurfacePoint {
 }
 
 /// How a chain ends.
+#[allow(clippy::large_enum_variant, reason = "one a chain, on the stack; most chains end at a surface")]
 #[derive(Clone, Copy, Debug)]
 pub enum End {
     /// At a surface that neither transmits nor mirrors.
@@ -219,19 +223,23 @@ impl<'a> Follower<'a> {
                     break;
                 }
                 Event::Straight { is_interface, rough } => {
+                    if walk.crossings > MAX_CROSSINGS || is_interface && chain.interfaces == MAX_EVENTS {
+                        chain.end = End::Exhausted;
+                        break;
+                    }
                     chain.interfaces += u32::from(is_interface);
                     chain.rough_interfaces += u32::from(rough);
                     if is_interface && chain.dielectric_id == 0 {
                         chain.dielectric_id = met.material_id;
                     }
-                    if chain.interfaces > MAX_EVENTS || walk.crossings > MAX_CROSSINGS {
-                        chain.end = End::Exhausted;
-                        break;
-                    }
                     continue;
                 }
                 Event::Scattered { scattering, rough } => (scattering, rough),
             };
+            if chain.interfaces == MAX_EVENTS {
+                chain.end = End::Exhausted;
+                break;
+            }
             chain.interfaces += 1;
             chain.rough_interfaces += u32::from(rough);
             counters.events += 1;
@@ -261,10 +269,6 @@ impl<'a> Follower<'a> {
             if let Some(log) = log.as_deref_mut() {
                 log.push(Step { transfer, scattering: Some(scattering) });
             }
-            if chain.interfaces > MAX_EVENTS {
-                chain.end = End::Exhausted;
-                break;
-            }
         }
         counters.exhausted += u64::from(matches!(chain.end, End::Exhausted));
         chain.direction = walk.ray.direction;
@@ -274,6 +278,7 @@ impl<'a> Follower<'a> {
 }
 
 /// What a surface does to the chain.
+#[allow(clippy::large_enum_variant, reason = "one at a time, on the stack; most events scatter")]
 enum Event {
     End,
     Straight { is_interface: bool, rough: bool },
@@ -323,10 +328,11 @@ impl<'a> Walk<'a> {
         self.ray.origin = met.point;
     }
 
-    /// Goes on from the surface in a new direction.
+    /// Goes on from the surface in a new direction; a refraction has [passed](Self::pass) already.
     fn turn(&mut self, met: &SurfacePoint, direction: DVec3, scattering: &Scattering) {
-        let outward = if scattering.kind == ScatterKind::Refraction { met.hit.leaving } else { !met.hit.leaving };
-        self.departures.depart(&self.ray, &met.hit, outward);
+        if scattering.kind != ScatterKind::Refraction {
+            self.departures.depart(&self.ray, &met.hit, !met.hit.leaving);
+        }
         self.ray = Ray { origin: met.point, direction: direction.normalize() };
         self.travelled = 0.0;
     }
@@ -355,38 +361,65 @@ impl<'a> Walk<'a> {
                 Event::Straight { is_interface: true, rough }
             }
             &Kind::Dielectric { rough, .. } => {
-                let inside = self.view.inside(&met.hit, met.material_id).expect("a dielectric fills a volume");
-                let current = self.media.current();
-                let next = if met.hit.leaving {
-                    self.media.preview_leave(&inside)
-                } else {
-                    Ok(self.media.preview_enter(&inside))
-                };
-                let Ok(next) = next else {
-                    counters.unmatched_exits += 1;
-                    self.cross(met);
-                    return Event::Straight { is_interface: false, rough: false };
-                };
-                if next == current {
+                let passage = self.passage(met, counters);
+                let next = passage.media.current();
+                if next == self.media.current() {
                     // The same medium on both sides: no optics, and the columns do not notice.
-                    self.change_media(met, inside);
-                    self.cross(met);
+                    self.pass(met, passage);
                     return Event::Straight { is_interface: false, rough: false };
                 }
                 let scattering = refract_or_reflect(momentum, &met.surface, medium, &media.of(next));
                 if scattering.kind == ScatterKind::Refraction {
-                    self.change_media(met, inside);
+                    self.pass(met, passage);
                 }
                 Event::Scattered { scattering, rough }
             }
         }
     }
 
-    fn change_media(&mut self, met: &SurfacePoint, inside: Inside) {
-        if met.hit.leaving {
-            self.media.leave(&inside);
-        } else {
-            self.media.enter(inside);
+    /// What lies behind the surface, together with all glass that coincides with it: two cemented faces are one interface
+    /// between their media, in whatever order rounding presents them.
+    fn passage(&self, met: &SurfacePoint, counters: &mut Counters) -> Passage {
+        let mut passage = Passage { media: self.media.clone(), departures: self.departures };
+        self.go_behind(&mut passage, &met.hit, met.material_id, counters);
+        if self.view.is_touching(&met.hit) {
+            let ahead = Ray { origin: met.point, direction: self.ray.direction };
+            for _ in 0..MAX_COINCIDENT {
+                counters.rays += 1;
+                let Some(hit) = self.view.intersect(&ahead, &passage.departures).filter(|hit| hit.at_start) else {
+                    break;
+                };
+                let id = self.view.material_id(&hit);
+                if self.view.inside(&hit, id).is_none() {
+                    break;
+                }
+                self.go_behind(&mut passage, &hit, id, counters);
+            }
+        }
+        passage
+    }
+
+    fn go_behind(&self, passage: &mut Passage, hit: &Hit, material_id: u32, counters: &mut Counters) {
+        passage.departures.depart(&self.ray, hit, hit.leaving);
+        let Some(inside) = self.view.inside(hit, material_id) else { return };
+        if !hit.leaving {
+            passage.media.enter(inside);
+        } else if !passage.media.leave(&inside) {
+            counters.unmatched_exits += 1;
         }
     }
+
+    /// Takes what [`passage`](Self::passage) found; the direction is the caller's.
+    fn pass(&mut self, met: &SurfacePoint, passage: Passage) {
+        self.crossings += 1;
+        self.media = passage.media;
+        self.departures = passage.departures;
+        self.ray.origin = met.point;
+    }
+}
+
+/// The far side of an interface.
+struct Passage {
+    media: MediaStack,
+    departures: Departures,
 }

@@ -51,7 +51,10 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
     set("abbe:samples", Attribute::Int(plan.samples.total as i32));
     set("abbe:seed", Attribute::Text(plan.seed.to_string()));
     set("abbe:settingsHash", Attribute::Text(settings_hash(scene, plan)));
-    set("abbe:complete", Attribute::Int(i32::from(complete)));
+    if !complete {
+        // A whole image says nothing, so that it is the same file however it came about.
+        set("abbe:complete", Attribute::Int(0));
+    }
     for layer in &plan.layers {
         set(&format!("abbe:unit:{}", layer.name), text(layer.aov.unit));
         if layer.name != layer.aov.name {

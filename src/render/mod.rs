@@ -6,6 +6,7 @@
 pub mod metadata;
 pub mod plan;
 pub mod request;
+mod settings;
 pub mod trace;
 
 use std::sync::Mutex;

@@ -5,43 +5,20 @@
 use std::fmt;
 
 use serde::Serialize;
-use serde_json::Value;
 
 use super::request::Request;
+use super::settings::{self, Attributes};
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::film::aov::{self, Aov};
-use crate::film::{SampleRange, Window, sum};
+use crate::film::aov::Aov;
+use crate::film::{SampleRange, Window};
+use crate::geometry::Shape;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
-use crate::scene::Scene;
-use crate::scene::description::{self, Authored, AuthoredMap, Product};
+use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
-use crate::spectrum::{self, Wavelength};
-
-/// Width of an image for which neither the request nor the stage says one (as usdrecord).
-const DEFAULT_WIDTH: u32 = 960;
-/// The largest image side: what an EXR window can address with room for arithmetic.
-const MAX_SIDE: u32 = 1 << 17;
-/// Wavelengths that a reference, a band or a channel may have, nm: the transport's.
-const SPECTRUM: [f64; 2] = [360.0, 830.0];
-/// AOV band unless chosen, nm.
-const DEFAULT_BAND: [f64; 2] = [400.0, 700.0];
-/// What `differentials` writes when nobody says what to write.
-const DEFAULT_AOVS: &[&str] = &[
-    "dispersion",
-    "dispersion_footprint",
-    "ddirection_dlambda",
-    "dposition_dlambda",
-    "ior",
-    "interfaces",
-    "depth",
-    "normal",
-    "position",
-    "refracted_position",
-    "prim_id",
-    "material_id",
-];
+use crate::scene::{Object, Scene};
+use crate::spectrum::Wavelength;
 
 /// One layer to be rendered.
 #[derive(Clone, Debug, Serialize)]
@@ -115,10 +92,10 @@ pub struct Plan {
 
 /// Plans for every product of the scene that `request` asks for; one plan if the stage has no product.
 pub fn plan(scene: &Scene, request: &Request, registry: &Registry) -> Result<Vec<Plan>> {
-    let settings = &scene.document().settings;
+    let authored = &scene.document().settings;
     if let Some(wanted) = &request.product {
-        let Some(product) = settings.products.iter().find(|p| p.path == *wanted) else {
-            let known: Vec<_> = settings.products.iter().map(|p| p.path.as_str()).collect();
+        let Some(product) = authored.products.iter().find(|p| p.path == *wanted) else {
+            let known: Vec<_> = authored.products.iter().map(|p| p.path.as_str()).collect();
             let known = if known.is_empty() { "the stage has none".to_owned() } else { known.join(", ") };
             return Err(Error::usage(
                 format!("--product {wanted}"),
@@ -127,23 +104,26 @@ pub fn plan(scene: &Scene, request: &Request, registry: &Registry) -> Result<Vec
         };
         return Ok(vec![plan_product(scene, request, registry, Some(product))?]);
     }
-    if settings.products.is_empty() {
-        return Ok(vec![plan_product(scene, request, registry, settings.base.as_ref())?]);
+    if authored.products.is_empty() {
+        return Ok(vec![plan_product(scene, request, registry, authored.base.as_ref())?]);
     }
-    settings.products.iter().map(|product| plan_product(scene, request, registry, Some(product))).collect()
+    authored.products.iter().map(|product| plan_product(scene, request, registry, Some(product))).collect()
 }
 
 fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: Option<&Product>) -> Result<Plan> {
     let mut diagnostics = Diagnostics::default();
-    let attributes = Attributes { maps: [product.map(|p| &p.abbe), Some(&scene.document().settings.abbe)] };
+    let attributes = Attributes::new(scene, product);
 
-    let (camera, camera_path) = choose_camera(scene, request, product)?;
+    let (camera, camera_path) = settings::camera(scene, request, product)?;
     let authored_camera = &scene.document().cameras[camera];
-    let resolution = choose_resolution(request, product, authored_camera)?;
-    let window = choose_window(request, product, resolution)?;
+    let resolution = settings::resolution(request, product, authored_camera)?;
+    let window = settings::window(request, product, resolution)?;
     let policy = product.map_or("expandAperture", |p| p.aspect_ratio_conform_policy.as_str());
     let conform_policy = ConformPolicy::from_token(policy).ok_or_else(|| {
-        Error::scene(product_place(product), format!("unknown aspectRatioConformPolicy '{policy}': use expandAperture"))
+        Error::scene(
+            settings::product_place(product),
+            format!("unknown aspectRatioConformPolicy '{policy}': use expandAperture"),
+        )
     })?;
     if authored_camera.f_stop > 0.0
         && authored_camera.focus_distance > 0.0
@@ -156,9 +136,9 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         );
     }
 
-    let samples = choose_samples(request, &attributes)?;
-    let optics = choose_optics(request, &attributes)?;
-    let (integrator, layers) = choose_layers(request, &attributes, product, registry, &mut diagnostics)?;
+    let samples = settings::samples(request, &attributes)?;
+    let optics = settings::optics(request, &attributes)?;
+    let (integrator, layers) = settings::layers(request, &attributes, product, registry, &mut diagnostics)?;
     let integrator = registry.find(&integrator)?;
     let aovs: Vec<&Aov> = layers.iter().map(|layer| layer.aov).collect();
     let dispersive = dispersive_material(scene, &optics);
@@ -169,7 +149,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         (None, Some(seed)) => seed as u64,
         (None, None) => 0,
     };
-    let compression = product.map(|p| compression(p, &mut diagnostics)).unwrap_or_default();
+    let compression = product.map(|p| settings::compression(p, &mut diagnostics)).unwrap_or_default();
     attributes.warn_of_unused(&mut diagnostics);
     if request.strict
         && let Some(warning) = diagnostics.warnings().first()
@@ -199,265 +179,6 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         materials,
         diagnostics,
     })
-}
-
-fn product_place(product: Option<&Product>) -> &str {
-    product.map_or("render settings", |p| p.path.as_str())
-}
-
-fn choose_camera(scene: &Scene, request: &Request, product: Option<&Product>) -> Result<(usize, String)> {
-    let cameras = &scene.document().cameras;
-    let index = match &request.camera {
-        Some(wanted) => cameras
-            .iter()
-            .position(|c| c.path == *wanted || c.path.rsplit('/').next() == Some(wanted.as_str()))
-            .ok_or_else(|| {
-                let known: Vec<_> = cameras.iter().map(|c| c.path.as_str()).collect();
-                Error::usage(
-                    format!("--camera {wanted}"),
-                    format!("the scene has no such camera: {}", known.join(", ")),
-                )
-            })?,
-        None => product.and_then(|p| p.camera).unwrap_or(0),
-    };
-    let camera = cameras.get(index).ok_or_else(|| {
-        Error::scene(
-            product_place(product),
-            format!("camera {index} of {} does not exist: export the stage again", cameras.len()),
-        )
-    })?;
-    Ok((index, camera.path.clone()))
-}
-
-fn choose_resolution(request: &Request, product: Option<&Product>, camera: &description::Camera) -> Result<[u32; 2]> {
-    let authored = match product.and_then(|p| p.resolution) {
-        Some([w, h]) => {
-            let side = |v: i64| u32::try_from(v).ok().filter(|&v| v > 0 && v <= MAX_SIDE);
-            let (Some(w), Some(h)) = (side(w), side(h)) else {
-                return Err(Error::scene(
-                    format!("{}.resolution", product_place(product)),
-                    format!("is ({w}, {h}): each side must be 1 to {MAX_SIDE} pixels"),
-                ));
-            };
-            Some([w, h])
-        }
-        None => None,
-    };
-    for (flag, value) in [("--width", request.width), ("--height", request.height)] {
-        if value.is_some_and(|v| v == 0 || v > MAX_SIDE) {
-            return Err(Error::usage(flag, format!("must be 1 to {MAX_SIDE} pixels, not {}", value.unwrap_or(0))));
-        }
-    }
-    let aspect =
-        authored.map_or(camera.horizontal_aperture / camera.vertical_aperture, |[w, h]| f64::from(w) / f64::from(h));
-    // The height is cut off, as usdrecord does, but never to nothing.
-    let side = |v: f64| if v.is_finite() { (v.floor() as u32).clamp(1, MAX_SIDE) } else { 1 };
-    Ok(match (request.width, request.height, authored) {
-        (Some(w), Some(h), _) => [w, h],
-        (Some(w), None, _) => [w, side(f64::from(w) / aspect)],
-        (None, Some(h), _) => [side(f64::from(h) * aspect), h],
-        (None, None, Some(authored)) => authored,
-        (None, None, None) => [DEFAULT_WIDTH, side(f64::from(DEFAULT_WIDTH) / aspect)],
-    })
-}
-
-fn choose_window(request: &Request, product: Option<&Product>, resolution: [u32; 2]) -> Result<Window> {
-    let full = Window::full(resolution);
-    if let Some([x0, y0, x1, y1]) = request.crop {
-        if x0 >= x1 || y0 >= y1 {
-            return Err(Error::usage(
-                "--crop",
-                format!("({x0}, {y0}) to ({x1}, {y1}) holds no pixel: X0,Y0,X1,Y1 are half-open, y down"),
-            ));
-        }
-        let limit = MAX_SIDE as i32;
-        if [x0, y0, x1, y1].iter().any(|v| v.abs() > limit) {
-            return Err(Error::usage("--crop", format!("reaches beyond ±{limit} pixels")));
-        }
-        return Ok(Window { x0, y0, x1, y1 });
-    }
-    let Some(product) = product else { return Ok(full) };
-    let [x_min, y_min, x_max, y_max] = product.data_window_ndc;
-    if ![x_min, y_min, x_max, y_max].iter().all(|v| v.is_finite() && v.abs() <= 16.0) {
-        return Err(Error::scene(format!("{}.dataWindowNDC", product.path), "must be finite and within ±16 images"));
-    }
-    // A pixel is inside when its centre is; NDC counts y from the bottom.
-    let first = |ndc: f64, side: u32| (ndc * f64::from(side) - 0.5).ceil() as i32;
-    let [w, h] = resolution;
-    let window =
-        Window { x0: first(x_min, w), y0: first(1.0 - y_max, h), x1: first(x_max, w), y1: first(1.0 - y_min, h) };
-    if window.area() == 0 {
-        return Err(Error::scene(
-            format!("{}.dataWindowNDC", product.path),
-            "holds no pixel: min must be less than max",
-        ));
-    }
-    Ok(window)
-}
-
-fn choose_samples(request: &Request, attributes: &Attributes<'_>) -> Result<SampleRange> {
-    let total = match request.samples {
-        Some(samples) => samples,
-        None => match attributes.integer("abbe:samples")? {
-            Some(samples) => u32::try_from(samples).unwrap_or(0),
-            None => 1,
-        },
-    };
-    crate::sampler::Sampler::new(total, 0)?;
-    match request.sample_range {
-        None => Ok(SampleRange::all(total)),
-        Some([begin, end]) if sum::is_aligned(begin, end, total) => Ok(SampleRange { begin, end, total }),
-        Some([begin, end]) => Err(Error::usage(
-            format!("--sample-range {begin}:{end}"),
-            format!(
-                "is not an aligned part of {total} samples: its length must be a power of two (or reach to the end) and \
-                 its begin a multiple of it, so that parts merge to the same bits"
-            ),
-        )),
-    }
-}
-
-fn choose_optics(request: &Request, attributes: &Attributes<'_>) -> Result<Optics> {
-    let wavelength = |place: &str, nm: f64| {
-        if (SPECTRUM[0]..=SPECTRUM[1]).contains(&nm) {
-            return Ok(Wavelength::from_nanometers(nm));
-        }
-        let hint = if (0.1..=20.0).contains(&nm) { ": it looks like micrometres, nanometres are wanted" } else { "" };
-        Err(Error::usage(place, format!("{nm} nm is outside {} to {} nm{hint}", SPECTRUM[0], SPECTRUM[1])))
-    };
-    let reference = match request.wavelength {
-        Some(nm) => wavelength("--wavelength", nm)?,
-        None => match attributes.number("abbe:referenceWavelength")? {
-            Some(nm) => wavelength("abbe:referenceWavelength", nm)?,
-            None => spectrum::REFERENCE,
-        },
-    };
-    let (place, band) = match request.band {
-        Some(band) => ("--band", band),
-        None => ("abbe:band", attributes.numbers("abbe:band")?.unwrap_or(DEFAULT_BAND)),
-    };
-    if band[0] >= band[1] {
-        return Err(Error::usage(place, format!("{}:{} is empty: give LO:HI in nm", band[0], band[1])));
-    }
-    let band = [wavelength(place, band[0])?, wavelength(place, band[1])?];
-    let mut channels = spectrum::response::CENTROIDS;
-    if let Some(authored) = attributes.numbers::<3>("abbe:channelWavelengths")? {
-        for (channel, nm) in channels.iter_mut().zip(authored) {
-            // 0 keeps the centroid of the response.
-            if nm != 0.0 {
-                *channel = wavelength("abbe:channelWavelengths", nm)?;
-            }
-        }
-    }
-    let dispersion_scale = match request.dispersion_scale {
-        Some(scale) => scale,
-        None => attributes.number("abbe:dispersionScale")?.unwrap_or(1.0),
-    };
-    if !(0.0..=1e3).contains(&dispersion_scale) {
-        return Err(Error::usage("--dispersion-scale", format!("must be 0 to 1000, not {dispersion_scale}")));
-    }
-    Ok(Optics { reference, band, channels, dispersion_scale })
-}
-
-/// The integrator's name and the layers, from `--aov` or from the product's RenderVars.
-fn choose_layers(
-    request: &Request,
-    attributes: &Attributes<'_>,
-    product: Option<&Product>,
-    registry: &Registry,
-    diagnostics: &mut Diagnostics,
-) -> Result<(String, Vec<PlannedLayer>)> {
-    let chosen = match &request.integrator {
-        Some(name) => name.clone(),
-        None => attributes
-            .text("abbe:integrator")?
-            .filter(|name| !name.is_empty())
-            .unwrap_or_else(|| "differentials".to_owned()),
-    };
-    let offered = registry.find(&chosen)?.aovs();
-    let find = |name: &str| {
-        let canonical = aov::canonical_name(name);
-        offered.iter().copied().find(|aov| aov.name == canonical)
-    };
-    let unavailable = |name: &str| match aov::canonical_name(name) {
-        "color" => format!("the integrator '{chosen}' computes no light transport, so it has no '{name}'"),
-        _ => format!("the integrator '{chosen}' has no AOV '{name}'; `abbe aovs` lists what there is"),
-    };
-    let mut layers = Vec::new();
-    if let Some(names) = &request.aovs {
-        for name in names {
-            let aov = find(name).ok_or_else(|| Error::usage(format!("--aov {name}"), unavailable(name)))?;
-            if layers.iter().all(|layer: &PlannedLayer| layer.aov.name != aov.name) {
-                layers.push(PlannedLayer { aov, name: aov.name.to_owned() });
-            }
-        }
-        if layers.is_empty() {
-            return Err(Error::usage("--aov", "no AOV is asked for: name one, or leave the option out"));
-        }
-        return Ok((chosen, layers));
-    }
-    for var in product.map_or(&[][..], |p| &p.vars) {
-        let source = if var.source_name.is_empty() { &var.name } else { &var.source_name };
-        let Some(aov) = find(source) else {
-            diagnostics.warn("unavailable-render-var", &var.path, format!("{}: it is left out", unavailable(source)));
-            continue;
-        };
-        let text = |name: &str| var.driver.get(name).and_then(|a| a.value.as_str()).unwrap_or("");
-        let name = match text("name") {
-            "" => var.name.as_str(),
-            name => name,
-        };
-        let name = format!("{}{name}", text("channel_prefix"));
-        let format = text("format");
-        if !matches!(format, "" | "auto") && (format.contains("half") || format.ends_with('h')) {
-            diagnostics.warn(
-                "half-format",
-                &var.path,
-                "asks for half floats, which lose what a derivative is for: FLOAT is written",
-            );
-        }
-        if let Some(other) = layers.iter().find(|layer: &&PlannedLayer| layer.name == name) {
-            return Err(Error::scene(
-                &var.path,
-                format!(
-                    "its layer '{name}' is also that of '{}': give it another driver:parameters:aov:name",
-                    other.aov.name
-                ),
-            ));
-        }
-        layers.push(PlannedLayer { aov, name });
-    }
-    if layers.is_empty() {
-        layers = DEFAULT_AOVS
-            .iter()
-            .filter_map(|name| find(name))
-            .map(|aov| PlannedLayer { aov, name: aov.name.to_owned() })
-            .collect();
-        if layers.is_empty() {
-            layers = offered.into_iter().map(|aov| PlannedLayer { aov, name: aov.name.to_owned() }).collect();
-        }
-    }
-    Ok((chosen, layers))
-}
-
-/// EXR compression that the product asks for, if lossless; the default else.
-fn compression(product: &Product, diagnostics: &mut Diagnostics) -> String {
-    let asked = ["OpenEXR:compression", "compression"]
-        .iter()
-        .find_map(|key| product.driver.get(*key))
-        .and_then(|a| a.value.as_str())
-        .unwrap_or("");
-    match asked {
-        "" | "zip" | "zips" | "piz" | "rle" | "none" => asked.to_owned(),
-        other => {
-            diagnostics.warn(
-                "compression",
-                &product.path,
-                format!("compression '{other}' would lose digits of derivatives: zip is written"),
-            );
-            String::new()
-        }
-    }
 }
 
 /// The first material whose index moves with wavelength under this render's scale.
@@ -492,16 +213,16 @@ fn reasons(
         if names.is_empty() {
             "no AOV asks for it".to_owned()
         } else if optics.dispersion_scale == 0.0 {
-            format!("the dispersion scale is 0, so {} is exactly 0", names.join(", "))
+            format!("the dispersion scale is 0: {} exactly 0", list(names, "is", "are"))
         } else {
-            format!("no material in use disperses, so {} is exactly 0", names.join(", "))
+            format!("no material in use disperses: {} exactly 0", list(names, "is", "are"))
         }
     };
     let mut decide = |what: &str, computed: bool, families: &[Family]| {
         let names = asked(families);
         let because = dispersive.map_or_else(String::new, |m| format!(", and {} disperses", m.path));
         let (list, why) = if computed {
-            (&mut carried, format!("{} asks for it{because}", names.join(", ")))
+            (&mut carried, format!("{} for it{because}", list(&names, "asks", "ask")))
         } else {
             (&mut skipped, why_not(&names))
         };
@@ -527,16 +248,27 @@ fn reasons(
     };
     let chain_asked = asked(&[Chain, LambdaColumn, LambdaSecondOrder, ScreenColumns, ScreenSecondOrder, Retrace]);
     if needs.chain {
-        note(true, "specular chain", format!("{} tells about it", chain_asked.join(", ")));
+        note(true, "specular chain", format!("{} about it", list(&chain_asked, "tells", "tell")));
     } else {
         note(
             false,
             "specular chain",
-            format!("only the first surface is asked for ({})", asked(&[FirstSurface]).join(", ")),
+            format!("{} about the first surface only", list(&asked(&[FirstSurface]), "tells", "tell")),
         );
     }
-    let uv = layers.iter().any(|layer| layer.aov.name.ends_with("uv"));
-    note(uv, "texture coordinates", if uv { "uv is asked for".into() } else { "no AOV asks for them".into() });
+    let uv: Vec<_> = layers.iter().map(|layer| layer.aov.name).filter(|name| name.ends_with("uv")).collect();
+    let why =
+        if uv.is_empty() { "no AOV asks for them".into() } else { format!("{} for them", list(&uv, "asks", "ask")) };
+    note(!uv.is_empty(), "texture coordinates", why);
+    if needs.columns > Columns::None {
+        match scene.objects.iter().find(|object| is_smooth_glass(scene, object)) {
+            Some(object) => {
+                let path = &scene.prims[object.prim_id as usize - 1];
+                note(true, "∂N, how normals move", format!("{path} is glass with a curved or smooth-shaded surface"));
+            }
+            None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
+        }
+    }
     note(
         false,
         "light sampling, emission, textures",
@@ -548,74 +280,24 @@ fn reasons(
     (carried, skipped)
 }
 
-/// Authored `abbe:…` attributes, the product's before the settings'.
-struct Attributes<'a> {
-    maps: [Option<&'a AuthoredMap>; 2],
+/// Names with the verb for one or for many; of a long list the first few.
+fn list(names: &[&str], one: &str, many: &str) -> String {
+    const SHOWN: usize = 4;
+    match names {
+        [name] => format!("{name} {one}"),
+        names if names.len() <= SHOWN + 1 => format!("{} {many}", names.join(", ")),
+        names => format!("{} and {} more {many}", names[..SHOWN].join(", "), names.len() - SHOWN),
+    }
 }
 
-impl<'a> Attributes<'a> {
-    fn get(&self, name: &str) -> Option<&'a Authored> {
-        self.maps.iter().flatten().find_map(|map| map.get(name))
-    }
-
-    /// What the settings ask for and this version lacks is named, unless it is what happens anyway.
-    fn warn_of_unused(&self, diagnostics: &mut Diagnostics) {
-        const UNUSED: &[(&str, &str, &str)] = &[
-            ("abbe:errorTarget", "0", "rendering to an error target is not offered: every pixel gets all its samples"),
-            ("abbe:timeLimit", "0", "a time limit is not offered: the image is finished"),
-            ("abbe:scalarIor", "constant", "only 'constant' is offered: a scalar index has no dispersion"),
-            ("abbe:pixelFilter", "box", "values are means over the pixel's own samples: no other filter is offered"),
-        ];
-        for (name, harmless, message) in UNUSED {
-            if let Some(authored) = self.get(name) {
-                let value = authored.value.as_str().map_or_else(|| authored.value.to_string(), str::to_owned);
-                if value != *harmless && value != format!("{harmless}.0") {
-                    diagnostics.warn(
-                        "unused-setting",
-                        format!("render settings, {name}"),
-                        format!("is {value}, but {message}"),
-                    );
-                }
-            }
-        }
-    }
-
-    fn wrong(name: &str, value: &Value, wanted: &str) -> Error {
-        Error::scene(format!("render settings, {name}"), format!("is {value}: {wanted} is wanted"))
-    }
-
-    fn number(&self, name: &str) -> Result<Option<f64>> {
-        let Some(authored) = self.get(name) else { return Ok(None) };
-        match authored.value.as_f64().filter(|v| v.is_finite()) {
-            Some(number) => Ok(Some(number)),
-            None => Err(Self::wrong(name, &authored.value, "a number")),
-        }
-    }
-
-    fn integer(&self, name: &str) -> Result<Option<i64>> {
-        let Some(authored) = self.get(name) else { return Ok(None) };
-        match authored.value.as_i64().filter(|&v| v >= 0) {
-            Some(number) => Ok(Some(number)),
-            None => Err(Self::wrong(name, &authored.value, "a whole number, 0 or more,")),
-        }
-    }
-
-    fn text(&self, name: &str) -> Result<Option<String>> {
-        let Some(authored) = self.get(name) else { return Ok(None) };
-        match authored.value.as_str() {
-            Some(text) => Ok(Some(text.to_owned())),
-            None => Err(Self::wrong(name, &authored.value, "a name")),
-        }
-    }
-
-    fn numbers<const N: usize>(&self, name: &str) -> Result<Option<[f64; N]>> {
-        let Some(authored) = self.get(name) else { return Ok(None) };
-        let list = authored.value.as_array().map(|list| list.iter().filter_map(Value::as_f64).collect::<Vec<_>>());
-        match list.and_then(|list| <[f64; N]>::try_from(list).ok()) {
-            Some(numbers) => Ok(Some(numbers)),
-            None => Err(Self::wrong(name, &authored.value, "a list of numbers")),
-        }
-    }
+/// Whether the object is glass whose normals move over its surface.
+fn is_smooth_glass(scene: &Scene, object: &Object) -> bool {
+    let is_glass = |id: &u32| id.checked_sub(1).is_some_and(|i| scene.materials[i as usize].has_interior());
+    let is_smooth = match &*object.shape {
+        Shape::Sphere(_) => true,
+        Shape::Mesh(mesh) => mesh.has_normals(),
+    };
+    is_smooth && object.material_ids.iter().any(is_glass)
 }
 
 impl fmt::Display for Plan {
@@ -645,8 +327,10 @@ impl fmt::Display for Plan {
             nm(self.optics.band[1]),
             self.optics.dispersion_scale
         )?;
-        let names: Vec<_> = self.layers.iter().map(|layer| layer.aov.name).collect();
-        writeln!(f, "layers       {}", names.join(", "))?;
+        for (i, names) in self.layers.chunks(6).enumerate() {
+            let names: Vec<_> = names.iter().map(|layer| layer.aov.name).collect();
+            writeln!(f, "{:13}{}", if i == 0 { "layers" } else { "" }, names.join(", "))?;
+        }
         for (title, decisions) in
             [("carried", &self.carried), ("skipped", &self.skipped), ("materials", &self.materials)]
         {

@@ -5,8 +5,9 @@ use serde_json::{Value, json};
 
 use super::Plan;
 use crate::error::{Error, Result};
+use crate::film::Window;
 use crate::integrator::chain::{Chain, Counters, End, Follower};
-use crate::ray::{Column, ColumnSet, SecondOrderColumns, Step};
+use crate::ray::{Column, ColumnSet, ScatterKind, SecondOrderColumns, Step};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::scene::view::{Media, View};
@@ -15,6 +16,18 @@ use crate::scene::view::{Media, View};
 pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result<Value> {
     if sample >= plan.samples.total {
         return Err(Error::usage("--sample", format!("{sample} of {}: the first is 0", plan.samples.total)));
+    }
+    let [width, height] = plan.resolution;
+    let in_raster = (0..width as i32).contains(&pixel[0]) && (0..height as i32).contains(&pixel[1]);
+    let Window { x0, y0, x1, y1 } = plan.window;
+    if !in_raster && !((x0..x1).contains(&pixel[0]) && (y0..y1).contains(&pixel[1])) {
+        return Err(Error::usage(
+            "--pixel",
+            format!(
+                "({}, {}) is outside of the image of {width} x {height} pixels: x right, y down, from 0",
+                pixel[0], pixel[1]
+            ),
+        ));
     }
     let camera = super::camera(scene, plan)?;
     let view = View::new(scene, camera.position);
@@ -37,7 +50,11 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
         let before = columns;
         columns.scatter(scattering);
         events.push(json!({
-            "event": format!("{:?}", scattering.kind),
+            "event": match scattering.kind {
+                ScatterKind::Refraction => "refraction",
+                ScatterKind::TotalReflection => "total_reflection",
+                ScatterKind::Mirror => "mirror",
+            },
             "distance": transfer.distance,
             "position": array(view.origin + point),
             "normal": array(scattering.normal),

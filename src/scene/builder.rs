@@ -10,7 +10,7 @@ use glam::{DAffine3, DMat4};
 use rayon::prelude::*;
 
 use super::description::{self, Array, Description, Document, Element, Group, Placement, Target};
-use super::material::{self, Kind, Material, ScalarIor};
+use super::material::{self, Material, ScalarIor};
 use super::{Counts, Object, Scene};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
@@ -46,7 +46,7 @@ pub fn build(description: Description) -> Result<Scene> {
         let mut list = vec![material_of(placement.material)];
         list.extend(placement.subset_materials.iter().map(|m| material_of(m.or(placement.material))));
         list.resize(1 + report.subsets, list[0]);
-        if !report.is_closed && list.iter().any(|&id| id > 0 && has_interior(&materials[id as usize - 1])) {
+        if !report.is_closed && list.iter().any(|&id| id > 0 && materials[id as usize - 1].has_interior()) {
             diagnostics.warn(
                 "open-glass-mesh",
                 &placement.path,
@@ -86,11 +86,6 @@ pub fn build(description: Description) -> Result<Scene> {
         diagnostics,
         description,
     })
-}
-
-/// Whether a ray inside is in another medium.
-fn has_interior(material: &Material) -> bool {
-    matches!(material.kind, Kind::Dielectric { thin_walled: false, .. })
 }
 
 /// Paths in the order of first use; ids start at 1.

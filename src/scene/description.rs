@@ -84,6 +84,7 @@ pub struct Stage {
 }
 
 /// A shape in its object space.
+#[allow(clippy::large_enum_variant, reason = "a document holds few shapes next to the arrays they name")]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum Shape {

@@ -13,6 +13,7 @@ use bytes::Bytes;
 use safetensors::tensor::{Dtype, SafeTensors, View};
 
 use super::description::{Array, Description, Element, FORMAT};
+use crate::atomic;
 use crate::error::{Error, Result};
 
 /// Name of the tensor that holds the document.
@@ -59,20 +60,9 @@ pub fn write(path: &Path, description: &Description) -> Result<()> {
         tensors.insert(name.clone(), Tensor { dtype, shape: array.shape.clone(), bytes: &array.bytes });
     }
     let metadata = std::collections::HashMap::from([("format".to_owned(), FORMAT.to_owned())]);
-    let directory = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let temporary = tempfile::Builder::new()
-        .prefix(".abbe-")
-        .suffix(".part")
-        .tempfile_in(directory)
-        .map_err(|e| Error::io(path, "create a file in its folder", e))?;
-    safetensors::tensor::serialize_to_file(&tensors, Some(metadata), temporary.path())
-        .map_err(|e| Error::file(path, format!("cannot be written: {e}")))?;
-    File::open(temporary.path()).and_then(|f| f.sync_all()).map_err(|e| Error::io(path, "flush to disk", e))?;
-    temporary.persist(path).map_err(|e| Error::io(path, "move into place", e.error))?;
-    Ok(())
+    let bytes = safetensors::serialize(&tensors, Some(metadata))
+        .map_err(|e| Error::file(path, format!("cannot be put together: {e}")))?;
+    atomic::replace(path, |out| atomic::put(out, path, &bytes))
 }
 
 /// Reads the scene file `path`; `mapped` maps it into memory instead (it must then not change while it is in use).

@@ -1,7 +1,7 @@
 //! What a material says, compiled to what a ray follows.
 //!
-//! The index comes from the first of: our `abbe:…` attributes ([`law`]); the dispersion inputs of the shading network,
-//! each by its own specification ([`dialect`]); a scalar index, constant unless [`ScalarIor`] says otherwise. Fallbacks
+//! The index comes from the first of: our `abbe:…` attributes (`law`); the dispersion inputs of the shading network,
+//! each by its own specification (`dialect`); a scalar index, constant unless [`ScalarIor`] says otherwise. Fallbacks
 //! of a schema never decide, only authored values do, and what decided stands in [`Material::chosen`].
 
 mod dialect;
@@ -58,6 +58,13 @@ pub struct Material {
     pub kind: Kind,
     /// What decided the kind and the index, and why; one line for the plan.
     pub chosen: String,
+}
+
+impl Material {
+    /// Whether a ray inside is in another medium.
+    pub fn has_interior(&self) -> bool {
+        matches!(self.kind, Kind::Dielectric { thin_walled: false, .. })
+    }
 }
 
 /// What a ray of the specular chain does at a surface.

@@ -22,6 +22,8 @@ pub struct View<'a> {
     pub aggregate: Aggregate,
     /// World position of the origin.
     pub origin: DVec3,
+    /// Per object: whether its glass can coincide with that of another.
+    touching: Vec<bool>,
 }
 
 impl<'a> View<'a> {
@@ -32,7 +34,17 @@ impl<'a> View<'a> {
             .iter()
             .map(|object| Instance { shape: object.shape.clone(), world_from_object: object.world_from_object })
             .collect();
-        Self { scene, aggregate: Aggregate::build(&instances, origin), origin }
+        let aggregate = Aggregate::build(&instances, origin);
+        let touching = aggregate.touching(|object| {
+            let ids = &scene.objects[object as usize].material_ids;
+            ids.iter().any(|id| id.checked_sub(1).is_some_and(|i| scene.materials[i as usize].has_interior()))
+        });
+        Self { scene, aggregate, origin, touching }
+    }
+
+    /// Whether the surface at `hit` can coincide with another object's glass (cemented lenses, liquid in its glass).
+    pub fn is_touching(&self, hit: &Hit) -> bool {
+        self.touching[hit.instance as usize]
     }
 
     /// `material_id` at `hit`, 0 for none.
@@ -66,7 +78,7 @@ impl<'a> View<'a> {
     /// one fixed ray. The nearest exit is the innermost medium.
     pub fn media_at(&self, p: DVec3) -> MediaStack {
         let mut stack = MediaStack::new();
-        if !self.scene.materials.iter().any(|m| matches!(m.kind, Kind::Dielectric { thin_walled: false, .. })) {
+        if !self.scene.materials.iter().any(Material::has_interior) {
             return stack;
         }
         let mut crossings = Vec::new();

@@ -153,7 +153,8 @@ fn closedness_sees_through_split_vertices() {
 fn texture_coordinates_follow_every_interpolation() {
     let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
     let corners = vec![0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0];
-    let cases: [(Interpolation, Vec<f32>, Option<&[i32]>, [f64; 2]); 5] = [
+    type Case = (Interpolation, Vec<f32>, Option<&'static [i32]>, [f64; 2]);
+    let cases: [Case; 5] = [
         (Interpolation::Vertex, corners.clone(), None, [0.25, 0.75]),
         (Interpolation::Varying, corners.clone(), Some(&[3, 2, 1, 0]), [0.25, 0.25]),
         (Interpolation::FaceVarying, corners, None, [0.25, 0.75]),

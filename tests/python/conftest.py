@@ -63,7 +63,7 @@ def Xform "World" {
     def Mesh "Prism" (prepend apiSchemas = ["MaterialBindingAPI"]) {
         uniform token subdivisionScheme = "none"
         int[] faceVertexCounts = [3, 3, 4, 4, 4]
-        int[] faceVertexIndices = [0, 1, 2, 5, 4, 3, 1, 0, 3, 4, 2, 1, 4, 5, 0, 2, 5, 3]
+        int[] faceVertexIndices = [2, 1, 0, 3, 4, 5, 4, 3, 0, 1, 5, 4, 1, 2, 3, 5, 2, 0]
         point3f[] points = [(-1, -1, 1), (1, -1, 1), (0, -1, -0.7), (-1, 1, 1), (1, 1, 1), (0, 1, -0.7)]
         rel material:binding = </World/Glass>
     }

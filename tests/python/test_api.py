@@ -96,6 +96,13 @@ def test_a_stage_in_memory_and_its_file_give_the_same_bits(slab: Slab) -> None:
     np.testing.assert_array_equal(ours["dispersion"], theirs["dispersion"])
 
 
+def test_a_scene_tells_what_it_is(slab: Slab, tmp_path: Path) -> None:
+    scene = abbe.Scene.from_stage(slab())
+    assert repr(scene) == "<abbe.Scene of slab.usda: 1 camera, 2 shapes, 1 material, frame 7>"
+    scene.save(tmp_path / "scene.safetensors")
+    assert repr(abbe.Scene.load(tmp_path / "scene.safetensors")) == repr(scene)
+
+
 def test_a_saved_scene_gives_the_same_bits(slab: Slab, tmp_path: Path) -> None:
     scene = abbe.Scene.from_stage(slab())
     scene.save(tmp_path / "scene.safetensors")

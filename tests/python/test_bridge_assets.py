@@ -9,9 +9,10 @@ from description_schema import validate
 
 pytest.importorskip("pxr.Usd", reason="the bridge needs usd-core")
 
+from pxr import Usd, UsdGeom, UsdShade
+
 from abbe.errors import StageError
 from abbe.usd import describe, list_cameras, list_settings
-from pxr import Usd, UsdGeom, UsdShade
 
 ROOT = Path(__file__).resolve().parents[2]
 EXTENSIONS = (".usd", ".usda", ".usdc", ".usdz")

@@ -12,9 +12,10 @@ from description_schema import validate
 
 pytest.importorskip("pxr.Usd", reason="the bridge needs usd-core")
 
+from pxr import Sdf, Usd, UsdGeom
+
 from abbe.errors import StageError, UsageError
 from abbe.usd import describe, list_cameras, list_settings
-from pxr import Sdf, Usd, UsdGeom
 
 STAGES = Path(__file__).parent / "stages"
 

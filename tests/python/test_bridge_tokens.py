@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from abbe.usd import tokens
 
 ROOT = Path(__file__).resolve().parents[2]

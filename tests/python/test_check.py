@@ -1,12 +1,15 @@
 """`abbe check`: a sound file passes, every kind of damage is found with file, channel and pixel."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
 import sample_exr
-from abbe.check import check
 from sample_exr import TABLE
+
+from abbe.check import check
+from abbe.errors import AbbeError
 
 pytest.importorskip("OpenImageIO", reason="the check opens files with OpenImageIO")
 
@@ -193,14 +196,42 @@ def test_exact_sums_of_a_part_are_checked(tmp_path):
 def test_files_that_do_not_open_fail(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"none\.exr"):
         check(tmp_path / "none.exr", aovs=TABLE)
-    (tmp_path / "text.exr").write_text("no image")
-    report = check(tmp_path / "text.exr", aovs=TABLE)
-    assert not report.passed
-    assert "OpenImageIO cannot open" in str(report)
+    with pytest.raises(AbbeError, match="is a folder"):
+        check(tmp_path, aovs=TABLE)
     run(tmp_path)
+    for name, content in (("text.exr", b"no image"), ("empty.exr", b""), ("ball.png", b"\x89PNG\r\n\x1a\n")):
+        (tmp_path / name).write_bytes(content)
+        for path, against in ((name, "out.exr"), ("out.exr", name)):
+            with pytest.raises(AbbeError, match=f"{name}: is not an EXR that abbe wrote"):
+                check(tmp_path / path, against=tmp_path / against, aovs=TABLE)
+    (tmp_path / "head.exr").write_bytes((tmp_path / "out.exr").read_bytes()[:40])
+    report = check(tmp_path / "head.exr", aovs=TABLE)
+    assert not report.passed
+    assert str(report).startswith(f"{tmp_path / 'head.exr'}: OpenImageIO cannot open it: ")
+    assert len(str(report).splitlines()) == 1
     whole = (tmp_path / "out.exr").read_bytes()
     (tmp_path / "cut.exr").write_bytes(whole[: len(whole) - 200])
     assert not check(tmp_path / "cut.exr", aovs=TABLE).passed
+
+
+def test_a_file_of_other_software_is_one_fault(tmp_path):
+    channels, header = sample_exr.sound()
+    path = tmp_path / "other.exr"
+    sample_exr.write(path, channels, {"software": "Nuke"})
+    report = check(path, aovs=TABLE)
+    assert not report.passed
+    (line,) = str(report).splitlines()
+    assert line.startswith(f"{path}: is not an EXR that abbe wrote: ")
+    # Such a file can still be compared.
+    sample_exr.write(tmp_path / "same.exr", channels, header)
+    assert all(d.passed for d in check(path, against=tmp_path / "same.exr", aovs=TABLE).differences)
+
+
+def test_without_openimageio_the_extra_is_named(tmp_path, monkeypatch):
+    (tmp_path / "out.exr").touch()
+    monkeypatch.setitem(sys.modules, "OpenImageIO", None)
+    with pytest.raises(AbbeError, match=r"pip install 'abbe\[check\]'"):
+        check(tmp_path / "out.exr", aovs=TABLE)
 
 
 def test_equal_files_do_not_differ(tmp_path):

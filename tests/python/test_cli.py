@@ -2,17 +2,22 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import abbe
+from abbe import doctor
 from abbe.cli import frames
+from abbe.cli import render as render_command
+from abbe.cli import trace as trace_command
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 Slab = Callable[..., Path]
@@ -41,6 +46,28 @@ def test_render_writes_the_file_and_says_so(run: Run, slab: Slab, tmp_path: Path
     assert result.returncode == 0, result.stderr
     assert result.stdout.startswith("out.exr: 2 AOVs, 512 pixels")
     assert leftovers(tmp_path) == ["out.exr"]
+
+
+def test_one_is_singular(run: Run, slab: Slab) -> None:
+    result = run("render", slab(), "out.exr", "--width", "32", "--aov", "ior", "--crop", "3,4,4,5")
+    assert result.stdout.startswith("out.exr: 1 AOV, 1 pixel, "), result.stderr
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "0 s"),
+        (0.000123456, "0.000123 s"),
+        (0.0456, "0.0456 s"),
+        (0.5, "0.500 s"),
+        (0.9996, "1.00 s"),
+        (12.345, "12.3 s"),
+        (99.96, "100 s"),
+        (12345.6, "12346 s"),
+    ],
+)
+def test_times_have_three_digits(seconds: float, text: str) -> None:
+    assert render_command._seconds(seconds) == text
 
 
 def test_quiet_says_nothing(run: Run, slab: Slab) -> None:
@@ -114,7 +141,8 @@ def test_crops_and_sample_ranges_merge_to_the_same_bits(run: Run, slab: Slab, tm
             parts.append(part)
     result = run("merge", *parts, "-o", "merged.exr")
     assert result.returncode == 0, result.stderr
-    assert (tmp_path / "merged.exr").read_bytes() == (tmp_path / "whole.exr").read_bytes()
+    # Without a tolerance: the same bits.
+    assert run("check", "merged.exr", "--against", "whole.exr").returncode == 0
 
 
 def test_statistics_and_preview(run: Run, slab: Slab, tmp_path: Path) -> None:
@@ -128,6 +156,13 @@ def test_statistics_and_preview(run: Run, slab: Slab, tmp_path: Path) -> None:
     assert stats["renders"][0]["frame"] == 7
     assert (tmp_path / "look.png").read_bytes().startswith(b"\x89PNG")
     assert leftovers(tmp_path) == ["look.png", "out.exr", "stats.json"]
+    # All have the rights that the umask gives.
+    (tmp_path / "plain").touch()
+    rights = (tmp_path / "plain").stat().st_mode
+    assert {name: (tmp_path / name).stat().st_mode for name in ("look.png", "stats.json")} == {
+        "look.png": rights,
+        "stats.json": rights,
+    }
 
 
 # Frames
@@ -236,6 +271,11 @@ def test_bad_stages(run: Run, slab: Slab, tmp_path: Path) -> None:
     said(run("render", "missing.usda", "out.exr"), 1, "missing.usda")
     (tmp_path / "text.usda").write_text("this is no stage")
     said(run("render", "text.usda", "out.exr"), 1, "text.usda")
+    (tmp_path / "o.exr").write_bytes(b"v/1\x01 and more")
+    line = said(run("plan", "o.exr"), 1, "o.exr: is not a USD file: name a .usd, .usda, .usdc or .usdz file")
+    assert line.endswith("or an exported .safetensors scene")
+    assert "safetensors" not in said(run("list-cameras", "o.exr"), 1, "o.exr: is not a USD file: name a .usd")
+    (tmp_path / "o.exr").unlink()
     (tmp_path / "noise.safetensors").write_bytes(bytes(range(256)))
     said(run("render", "noise.safetensors", "out.exr"), 1, "noise.safetensors")
     for name, edit in {
@@ -328,18 +368,41 @@ def test_trace_prints_every_event(run: Run, slab: Slab) -> None:
     assert told["interfaces"] == len(told["events"]) >= 1
     text = run("trace", stage, "--pixel", "15,10", "--width", "32")
     assert text.returncode == 0, text.stderr
-    assert "∂λ" in text.stdout and "Refraction" in text.stdout
+    assert "∂λ" in text.stdout and " refraction at (" in text.stdout
+    assert not re.search(r"-0[,)]", text.stdout)
     said(run("trace", stage, "--pixel", "15", "--width", "32"), 2, "--pixel")
     said(run("trace", stage, "--pixel", "1,1", "--sample", "5"), 2, "--sample")
+
+
+def test_traces_are_told_in_plain_words() -> None:
+    for name in ("TotalReflection", "total_reflection"):
+        assert trace_command._event_name(name) == "total reflection"
+    assert trace_command._vector((-0.0, 0.0, -1e-12, 1 / 3)) == "(0, 0, -1e-12, 0.333333333)"
 
 
 def test_doctor_finds_everything_well_here(run: Run) -> None:
     result = run("doctor", "--json")
     assert result.returncode == 0, result.stdout
     findings = {finding["what"]: finding for finding in json.loads(result.stdout)}
-    assert {"abbe", "Python", "NumPy", "USD", "schemas", "OpenImageIO", "Pillow"} <= findings.keys()
+    assert {"abbe", "Python", "NumPy", "USD", "schemas", "OpenImageIO", "Pillow", "matplotlib"} <= findings.keys()
     assert findings["schemas"]["state"] == "ok"
     assert "USD" in run("doctor").stdout
+
+
+def test_doctor_names_the_extra_of_everything_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    extras = {"USD": "usd", "OpenImageIO": "check", "Pillow": "preview", "matplotlib": "plot"}
+    for module in ("pxr", "pxr.Usd", "OpenImageIO", "PIL", "matplotlib"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+
+    def find_spec(name: str, *_: object) -> None:
+        if name in ("pxr", "OpenImageIO", "PIL", "matplotlib"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+    monkeypatch.setattr(sys, "meta_path", [SimpleNamespace(find_spec=find_spec), *sys.meta_path])
+    findings = {finding.what: finding for finding in doctor.examine()}
+    for what, extra in extras.items():
+        assert findings[what].state == "absent"
+        assert findings[what].text.endswith(f"pip install 'abbe[{extra}]'")
 
 
 def test_plugin_path_is_a_folder_that_usd_can_register(run: Run) -> None:
@@ -353,7 +416,10 @@ def test_check_accepts_ours_and_refuses_noise(run: Run, slab: Slab, tmp_path: Pa
     assert result.returncode == 0, result.stdout + result.stderr
     assert run("check", "out.exr", "--against", "out.exr").returncode == 0
     (tmp_path / "noise.exr").write_bytes(b"noise")
-    assert run("check", "noise.exr").returncode == 4
+    said(run("check", "noise.exr"), 1, "noise.exr: is not an EXR that abbe wrote: ")
+    (tmp_path / "cut.exr").write_bytes((tmp_path / "out.exr").read_bytes()[:-100])
+    result = run("check", "cut.exr")
+    assert (result.returncode, len(result.stdout.splitlines()), result.stderr) == (4, 1, "")
     said(run("check", "missing.exr"), 1, "missing.exr")
 
 
@@ -365,6 +431,9 @@ def test_help_is_there_for_every_command(run: Run) -> None:
     ):
         assert command in overview
         assert run(command, "--help").returncode == 0
+        # The stage is offered as a scene file where it may be one.
+        takes_scenes = command in ("render", "plan", "export", "trace")
+        assert ("an exported .safetensors scene" in " ".join(run(command, "--help").stdout.split())) == takes_scenes
     assert run("--version").stdout == f"abbe {abbe.__version__}\n"
 
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+
 from abbe import preview
 from abbe.errors import AbbeError, UsageError
 from abbe.preview import Tile, contact_sheet, write_preview
@@ -151,6 +152,54 @@ def test_any_size_and_content_can_be_shown(shape, fill):
     tiles += [Tile("prim_id", "prim_id", np.full((*shape, 1), 4_000_000_000, np.uint32), None, "index")]
     tiles += [Tile("interfaces", "interfaces", np.full((*shape, 1), 4_000_000_000, np.uint32), None, "count")]
     contact_sheet(tiles, title="title λ")
+
+
+def test_rows_are_full_where_they_can_be():
+    # Cells of a 16:9 image.
+    grids = {count: preview._columns(count, 422, 375) for count in range(1, 26)}
+    assert [grids[count] for count in (1, 2, 3)] == [1, 2, 3]
+    assert grids[4] in (2, 4)
+    assert (grids[6], grids[12], grids[20]) == (3, 4, 5)
+    for count, columns in grids.items():
+        assert -count % columns <= 2, f"{count} tiles in {columns} columns"
+
+
+def test_legends_are_wrapped_not_cut():
+    text = "length of the vector; saturates at percentile 99; greatest value 7.465e-07"
+    lines = preview._wrapped(text, preview._SMALL, 330)
+    assert len(lines) == 2
+    assert " ".join(lines) == text
+    assert all(preview._length(line, preview._SMALL) <= 330 for line in lines)
+    # One word that is too long stays one.
+    assert preview._wrapped("a" * 200, preview._SMALL, 330) == ["a" * 200]
+
+
+@pytest.mark.parametrize("name", ["dispersion", "ddirection_dlambda", "depth", "ior", "uv", "position"])
+def test_no_text_of_a_narrow_sheet_is_shortened(name, monkeypatch):
+    channels = {"dispersion": 2, "uv": 2, "depth": 1, "ior": 1}.get(name, 3)
+    values = np.random.default_rng(1).lognormal(-20, 5, (60, 20, channels)).astype(np.float32)
+    bottoms = []
+    write = preview._write
+
+    def watched(canvas, at, text, size, colour, room=None, anchor="la"):
+        assert room is None or preview._length(text, size) <= room, text
+        bottoms.append(at[1] + size)
+        return write(canvas, at, text, size, colour, room, anchor)
+
+    monkeypatch.setattr(preview, "_write", watched)
+    title = "prism.usda   20 x 60   reference 587.5618 nm   band 400:700 nm"
+    sheet = contact_sheet([Tile(name, name, values, np.full((60, 20), 0.5, np.float32), "stage unit/nm")], title=title)
+    assert max(bottoms) <= sheet.size[1] - 8
+
+
+def test_a_legend_of_counts_tells_that_there_are_greater_ones():
+    assert preview._count_labels([0, 2, 5], 5, 24, 6) == [(0, "0"), (2, "2"), (5, "5")]
+    many = preview._count_labels(list(range(65)), 64, 24, 6)
+    assert many[-1] == (64, "… up to 64")
+    assert len(many) <= 24
+    assert many[:3] == [(0, "0"), (1, "1"), (2, "2")]
+    # Above the palette.
+    assert preview._count_labels([0, 64], 900, 24, 6) == [(0, "0"), (64, "… up to 900")]
 
 
 def test_identifiers_have_distinct_colours():

@@ -13,7 +13,8 @@ PROBE = """
 import sys
 from pxr import Plug, Usd
 Plug.Registry().RegisterPlugins(sys.argv[1])
-prim = Usd.Stage.CreateInMemory().DefinePrim("/M", "Material")
+stage = Usd.Stage.CreateInMemory()
+prim = stage.DefinePrim("/M", "Material")
 assert prim.ApplyAPI("AbbeDispersionAPI")
 print(prim.GetAttribute("abbe:dispersion:vd").Get())
 """

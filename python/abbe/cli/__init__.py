@@ -24,6 +24,7 @@ from .. import __version__
 from ..errors import AbbeError, UsageError
 from . import (
     aovs,
+    bench,
     check,
     doctor,
     export,
@@ -41,7 +42,7 @@ __all__ = ["main"]
 
 FAILED, USAGE, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 
-_COMMANDS = (render, plan, export, aovs, list_cameras, settings, trace, check, merge, doctor, plugin_path)
+_COMMANDS = (render, plan, export, aovs, list_cameras, settings, trace, check, merge, bench, doctor, plugin_path)
 
 
 class _Parser(argparse.ArgumentParser):

@@ -29,7 +29,7 @@ def add(commands: Any) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 4 if the file is at fault or differs."""
+    """Run the command; 4 if the EXR is at fault, is another program's, or differs."""
     from ..check import check
     from ..errors import UsageError
 

@@ -8,12 +8,13 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 from .._api import Options, Scene
-from ..errors import UsageError
+from ..errors import NotUsdError, UsageError
 from . import messages
 
 __all__ = ["add_quiet", "add_request", "add_stage", "numbers", "open_scene", "request", "stage_options"]
 
 SCENE_SUFFIX = ".safetensors"
+_SCENE_FILE = f"an exported {SCENE_SUFFIX} scene"
 
 
 def numbers(
@@ -51,17 +52,17 @@ def _names(text: str) -> list[str]:
     return [name for name in re.split(r"[,\s]+", text) if name]
 
 
-def add_stage(parser: argparse.ArgumentParser, time: bool = True) -> None:
+def add_stage(parser: argparse.ArgumentParser, time: bool = True, scene_file: bool = True) -> None:
     """Add the stage and how it is read.
 
     Parameters
     ----------
     parser : to add to
     time : offer ``--frame`` and ``--defaultTime``; commands with ``--frames`` have their own
+    scene_file : an exported scene will do instead
     """
-    parser.add_argument(
-        "stage", metavar="STAGE", help="a .usd, .usda, .usdc or .usdz file, or an exported .safetensors scene"
-    )
+    kinds = "a .usd, .usda, .usdc or .usdz file"
+    parser.add_argument("stage", metavar="STAGE", help=f"{kinds}, or {_SCENE_FILE}" if scene_file else kinds)
     group = parser.add_argument_group("the stage")
     if time:
         group.add_argument("--frame", type=float, metavar="T", help="time code; the stage's start unless given")
@@ -207,19 +208,22 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
     """Load the stage, or the scene file, at a time code."""
     messages.show_warnings(getattr(args, "quiet", False))
     if not is_scene_file(args):
-        return Scene.from_stage(
-            args.stage,
-            frame=time,
-            camera=args.camera,
-            render_settings=args.render_settings,
-            product=args.product,
-            purposes=args.purposes,
-            variants=args.variant,
-            overrides=args.overrides,
-            search_paths=args.search_path,
-            missing=args.missing,
-            strict=args.strict,
-        )
+        try:
+            return Scene.from_stage(
+                args.stage,
+                frame=time,
+                camera=args.camera,
+                render_settings=args.render_settings,
+                product=args.product,
+                purposes=args.purposes,
+                variants=args.variant,
+                overrides=args.overrides,
+                search_paths=args.search_path,
+                missing=args.missing,
+                strict=args.strict,
+            )
+        except NotUsdError as error:
+            raise NotUsdError(f"{error}, or {_SCENE_FILE}") from None
     given = {
         "--frame, --frames, --defaultTime": time is not None,
         "--render-settings": args.render_settings is not None,

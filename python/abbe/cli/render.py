@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
-import sys
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from .. import __version__
-from .._api import Options, Scene
+from .._api import Options, Scene, counted
 from .._core import Film
+from .._files import replacing
 from ..errors import AbbeError, UsageError
 from . import frames, messages, options
 from .progress import Reporter
@@ -128,13 +128,19 @@ def _area(film: Film) -> int:
     return (x1 - x0) * (y1 - y0)
 
 
+def _seconds(seconds: float) -> str:
+    """Three significant digits, never as a power of ten; all digits of whole seconds."""
+    if seconds <= 0:
+        return "0 s"
+    # Rounded first: 0.9996 is 1.00, one decimal fewer than its own magnitude says.
+    magnitude = math.floor(math.log10(float(f"{seconds:.2e}")))
+    return f"{seconds:.{max(0, 2 - magnitude)}f} s"
+
+
 def _write_statistics(path: str, outcome: _Outcome) -> None:
     document = {"abbe": __version__, "renders": outcome.renders}
-    folder = Path(path).resolve().parent
-    with tempfile.NamedTemporaryFile("w", dir=folder, prefix=".abbe-", suffix=".part", delete=False) as file:
-        json.dump(document, file, indent=2)
-        file.write("\n")
-    Path(file.name).replace(path)
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -178,8 +184,8 @@ def _render_frame(args: argparse.Namespace, time: Time, outcome: _Outcome) -> No
         outcome.files.append(output)
         outcome.renders.append({"output": output, "frame": scene.document["stage"].get("time_code"), **film.statistics})
         if not args.quiet:
-            seconds = film.statistics["trace_seconds"]
-            print(f"{output}: {len(film)} AOVs, {_area(film)} pixels, {seconds:.2f} s", file=sys.stdout)
+            counts = f"{counted(len(film), 'AOV')}, {counted(_area(film), 'pixel')}"
+            print(f"{output}: {counts}, {_seconds(film.statistics['trace_seconds'])}")
         if args.preview is not None:
             from ..preview import write_preview
 

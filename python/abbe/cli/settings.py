@@ -14,7 +14,7 @@ from . import messages, options
 def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser("settings", help="list the render settings of a stage", allow_abbrev=False)
-    options.add_stage(parser)
+    options.add_stage(parser, scene_file=False)
     parser.add_argument("--json", action="store_true", help="as JSON")
     parser.set_defaults(run=run)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -31,8 +32,18 @@ def add(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
+def _number(value: float) -> str:
+    # Adding 0 takes the sign from -0, which says nothing to a reader.
+    return f"{value + 0.0:.9g}"
+
+
 def _vector(values: Sequence[float]) -> str:
-    return "(" + ", ".join(f"{value:.9g}" for value in values) + ")"
+    return "(" + ", ".join(map(_number, values)) + ")"
+
+
+def _event_name(name: str) -> str:
+    """Plain words: ``total reflection`` of ``total_reflection`` and of ``TotalReflection``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).replace("_", " ").lower()
 
 
 def _print_columns(columns: Mapping[str, Any], indent: str) -> None:
@@ -55,9 +66,10 @@ def run(args: argparse.Namespace) -> int:
     print(f"camera {_vector(told['camera'])} direction {_vector(told['direction'])} ior {told['start_ior']:.9g}")
     for number, event in enumerate(told["events"], 1):
         before, after = event["ior"]
-        print(f"{number:3} {event['event']} at {_vector(event['position'])} after {event['distance']:.9g}")
+        name, distance = _event_name(event["event"]), _number(event["distance"])
+        print(f"{number:3} {name} at {_vector(event['position'])} after {distance}")
         print(f"      normal {_vector(event['normal'])}{' (geometric)' if event['geometric_normal_used'] else ''}")
-        print(f"      ior {before:.9g} to {after:.9g}, W² {event['w_squared']:.9g}")
+        print(f"      ior {before:.9g} to {after:.9g}, W² {_number(event['w_squared'])}")
         _print_columns(event["columns"]["leaving"], "      ")
     end = told["end"]
     if end["kind"] == "surface":

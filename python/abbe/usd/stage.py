@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import StageError, UsageError
+from ..errors import NotUsdError, StageError, UsageError
 from . import tokens
 from ._pxr import Ar, Pcp, Sdf, Tf, Usd, UsdUtils
 from .description import Diagnostics
@@ -179,10 +179,18 @@ def _root_layer(path: str, context: Any) -> Any:
         try:
             layer = Sdf.Layer.FindOrOpen(path)
         except RuntimeError as error:
+            if not Sdf.FileFormat.FindByExtension(path):
+                raise _not_usd(path) from None
             raise StageError(f"{path}: cannot be read as USD: {_usd_reason(error)}: export it again") from None
+    if not layer and not Sdf.FileFormat.FindByExtension(path):
+        raise _not_usd(path)
     if not layer:
         raise StageError(f"{path}: is not a USD file (.usda, .usdc, .usd, .usdz), or it cannot be read: check the file")
     return layer
+
+
+def _not_usd(path: str) -> NotUsdError:
+    return NotUsdError(f"{path}: is not a USD file: name a .usd, .usda, .usdc or .usdz file")
 
 
 def _compose(open_it: Any, source: str) -> Any:

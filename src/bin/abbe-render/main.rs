@@ -66,7 +66,7 @@ fn main() -> ExitCode {
         Some(path) if !renders.is_empty() => write_statistics(path, &renders),
         _ => Ok(()),
     };
-    match outcome.and_then(|()| written) {
+    match outcome.and(written) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Error::Interrupted) => {
             eprintln!("abbe: interrupted");
@@ -134,7 +134,10 @@ fn outputs(args: &Args, plans: &[Plan]) -> Result<Vec<PathBuf>> {
     };
     for (index, output) in outputs.iter().enumerate() {
         if output.as_os_str().is_empty() {
-            return Err(Error::usage("OUT", "is missing, and the scene names no usable output: give a file such as out.exr"));
+            return Err(Error::usage(
+                "OUT",
+                "is missing, and the scene names no usable output: give a file such as out.exr",
+            ));
         }
         let place = output.display().to_string();
         if output.extension().is_none_or(|suffix| !suffix.eq_ignore_ascii_case("exr")) {

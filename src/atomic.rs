@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 ///
 /// The data are on disk before the name is. An existing file is replaced in one step; a symbolic link is followed.
 /// On an error nothing is left behind.
-pub(super) fn replace(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
+pub(crate) fn replace(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
     let target = checked_target(path)?;
     let directory = directory_of(&target).to_owned();
     let name = target.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -19,7 +19,7 @@ pub(super) fn replace(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Re
     builder.prefix(&prefix).suffix(".tmp");
     #[cfg(unix)]
     {
-        // Temporary files are private by default; an image has the rights that the user's umask gives.
+        // Temporary files are private by default; an output has the rights that the user's umask gives.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
@@ -43,12 +43,10 @@ pub(super) fn replace(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Re
 /// Where a file for `path` really goes; refuses what must not be replaced.
 fn checked_target(path: &Path) -> Result<PathBuf> {
     if path.file_name().is_none() {
-        return Err(Error::file(path, "this is no file name: name the file to write, for instance out.exr"));
+        return Err(Error::file(path, "this is no file name: name the file to write"));
     }
     match fs::metadata(path) {
-        Ok(known) if known.is_dir() => {
-            Err(Error::file(path, "this is a directory: name a file in it, for instance out.exr"))
-        }
+        Ok(known) if known.is_dir() => Err(Error::file(path, "this is a directory: name a file in it")),
         Ok(known) if !known.is_file() => {
             Err(Error::file(path, "this is a device or pipe, which cannot be replaced in one step: name a plain file"))
         }
@@ -89,10 +87,10 @@ fn refused(path: &Path, directory: &Path, source: io::Error) -> Error {
         }
         _ => format!("the system refused it ({source}): check {place}, or choose another place"),
     };
-    Error::File { path: path.to_owned(), problem: format!("cannot write the image: {remedy}"), source: Some(source) }
+    Error::File { path: path.to_owned(), problem: format!("cannot be written: {remedy}"), source: Some(source) }
 }
 
 /// Writes `bytes`, naming `path` in the error.
-pub(super) fn put(out: &mut impl Write, path: &Path, bytes: &[u8]) -> Result<()> {
+pub(crate) fn put(out: &mut impl Write, path: &Path, bytes: &[u8]) -> Result<()> {
     out.write_all(bytes).map_err(|e| refused(path, directory_of(path), e))
 }
