@@ -30,8 +30,8 @@ ERRORS = {
         "/World/mesh: its transform is projective"
     ),
 }
-# Flat floors without a camera: framed as usdrecord does they are seen edge on, and there is nothing to see. Of the first
-# there is, but not at 32 pixels.
+# Flat floors without a camera: framed as usdrecord does they are seen edge on, and there is nothing to see (of the
+# first there is, but not at 32 pixels).
 EDGE_ON = {
     "Maya_MaterialX/MaterialX/DemoQuads.usda",
     "Maya_MaterialX/MaterialX/color_management_MTLX.usda",
