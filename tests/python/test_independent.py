@@ -38,6 +38,9 @@ PIXELS = {
         (189, 89, "RTTR", "/World/Tent"),
         (139, 148, "RTTTTR", "/World/Tent"),
         (195, 68, "RTTTTTTR", "/World/Tent"),
+        # Here a critical angle is what limits the footprint.
+        (113, 37, "RTTTTR", "/World/Tent"),
+        (98, 57, "R" + 49 * "T" + "R", "/World/Tent"),
     ],
     # Interpolated normals decide the interactions, facets where they happen.
     "lens": [
