@@ -20,6 +20,8 @@ _LISTED = 8
 # The camera that usdrecord frames with: GfCamera's defaults, in tenths of a stage unit.
 _HORIZONTAL_APERTURE = 20.955
 _VERTICAL_APERTURE = 15.2908
+# A box lower than this part of its depth is seen too nearly edge on to show what lies on it.
+_FLAT = 0.05
 _FOCAL_LENGTH = 50.0
 
 
@@ -109,23 +111,26 @@ def framed_camera(low: Any, high: Any, up_axis: str) -> dict[str, Any]:
     """Return a camera that sees the box from ``low`` to ``high`` as usdrecord's default one does.
 
     It looks along −z (along +y on a stage that is Z-up) from where the front face of the box fills the width of a 50 mm
-    lens (usdAppUtils/frameRecorder.cpp). Near and far planes enclose the box with room.
+    lens (usdAppUtils/frameRecorder.cpp). Near and far planes enclose the box with room. Where that would show a flat box
+    edge on (a floor, a grid), it looks down at 45° instead, from where the whole box is in view.
     """
     low, high = Gf.Vec3d(*low), Gf.Vec3d(*high)
     centre, size = (low + high) / 2.0, high - low
     z_up = up_axis == "Z"
     across, height, deep = (size[0], size[2], size[1]) if z_up else (size[0], size[1], size[2])
-    radius = math.hypot(across, height) / 2.0
-    if radius == 0.0:
-        # A point or a line of sight: any distance frames it.
-        radius = max(deep, 1.0) / 2.0
-    distance = radius / (_HORIZONTAL_APERTURE / 2.0 / _FOCAL_LENGTH) + deep / 2.0
-    transform = Gf.Matrix4d(1.0)
-    if z_up:
-        transform.SetRotate(Gf.Rotation(Gf.Vec3d(1, 0, 0), 90))
-        transform.SetTranslateOnly(centre - Gf.Vec3d(0, distance, 0))
+    pitch = 90.0 if z_up else 0.0
+    if height < _FLAT * deep:
+        pitch -= 45.0
+        deep = math.hypot(across, height, deep)
+        distance = deep / 2.0 / (_VERTICAL_APERTURE / 2.0 / _FOCAL_LENGTH) + deep / 2.0
     else:
-        transform.SetTranslate(centre + Gf.Vec3d(0, 0, distance))
+        radius = math.hypot(across, height) / 2.0
+        if radius == 0.0:
+            # A point or a line of sight: any distance frames it.
+            radius = max(deep, 1.0) / 2.0
+        distance = radius / (_HORIZONTAL_APERTURE / 2.0 / _FOCAL_LENGTH) + deep / 2.0
+    transform = Gf.Matrix4d(1.0).SetRotate(Gf.Rotation(Gf.Vec3d(1, 0, 0), pitch))
+    transform.SetTranslateOnly(centre + transform.TransformDir(Gf.Vec3d(0, 0, distance)))
     return {
         "path": "",
         "transform": matrix(transform),
