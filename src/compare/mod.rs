@@ -15,7 +15,8 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::integrator::chain::{Chain, Counters, End, Follower};
 use crate::ray::{
-    ColumnSet, LambdaColumn, NoColumns, RayStart, ScreenColumns, SecondOrderColumns, Step, second_order_along,
+    ColumnSet, Curvature, LambdaColumn, NoColumns, NormalField, RayStart, ScreenColumns, SecondOrderColumns, Step,
+    second_order_along,
 };
 use crate::render::Plan;
 use crate::scene::Scene;
@@ -143,15 +144,21 @@ impl Tracer<'_> {
     }
 }
 
-/// Two normals further apart than this (18°) belong to different facets; on a smooth surface they would mean a chain far
-/// too curved for any derivative.
-const SAME_FACET: f64 = 0.95;
+/// On a curved or smooth-shaded surface normals differ by less than this (cosine of 18°), or the chain is far too curved
+/// for any derivative.
+const SAME_SURFACE: f64 = 0.95;
 
-/// Whether two chains do the same at the same surfaces, so that derivatives of one tell about the other.
+/// Whether two chains do the same at the same surfaces, so that derivatives of one tell about the other: facets that are
+/// flat have to be the very same.
 fn are_of_one_family(a: &[Step], b: &[Step]) -> bool {
-    let kind = |step: &Step| step.scattering.map(|s| s.kind);
-    a.len() == b.len()
-        && a.iter().zip(b).all(|(a, b)| kind(a) == kind(b) && a.transfer.n_g.dot(b.transfer.n_g) > SAME_FACET)
+    let same = |a: &Step, b: &Step| {
+        let (n_a, n_b) = (a.transfer.n_g, b.transfer.n_g);
+        let is_flat = a.transfer.curvature == Curvature::Plane
+            && a.scattering.is_none_or(|s| matches!(s.field, NormalField::Flat));
+        a.scattering.map(|s| s.kind) == b.scattering.map(|s| s.kind)
+            && if is_flat { n_a == n_b } else { n_a.dot(n_b) > SAME_SURFACE }
+    };
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b))
 }
 
 fn end<C>(chain: &Chain<C>) -> Option<DVec3> {

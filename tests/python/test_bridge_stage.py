@@ -359,6 +359,28 @@ def test_without_a_camera_what_is_rendered_is_framed(up_axis):
         describe(stage, strict=True)
 
 
+@pytest.mark.parametrize("up_axis", ["Y", "Z"])
+def test_a_floor_is_framed_from_above(up_axis):
+    corners = [(-3, -5), (3, -5), (3, 5), (-3, 5)]
+    points = [(a, 0, -b) if up_axis == "Y" else (a, b, 0) for a, b in corners]
+    text = ", ".join(str(point) for point in points)
+    stage = in_memory(
+        f'(\n upAxis = "{up_axis}"\n)\n'
+        f'def Mesh "Floor"\n{{\n point3f[] points = [{text}]\n int[] faceVertexCounts = [4]\n'
+        ' int[] faceVertexIndices = [0, 1, 2, 3]\n uniform token subdivisionScheme = "none"\n}\n'
+    )
+    (camera,) = describe(stage).document["cameras"]
+    camera_from_world = np.linalg.inv(np.array(camera["transform"]).reshape(4, 4))
+    seen = np.array([(*point, 1) for point in points]) @ camera_from_world
+    assert np.array(camera["transform"])[8:11] == pytest.approx(
+        np.array([0, 1, 1] if up_axis == "Y" else [0, -1, 1]) / 2**0.5
+    )
+    # All corners are in view, and not on a line.
+    x, y = (seen[:, k] / -seen[:, 2] * camera["focal_length"] for k in (0, 1))
+    assert np.all(np.abs(x) < camera["horizontal_aperture"] / 2) and np.all(np.abs(y) < camera["vertical_aperture"] / 2)
+    assert np.ptp(y) > camera["vertical_aperture"] / 10
+
+
 def test_an_empty_stage_still_has_a_camera():
     description = describe(in_memory(""))
     validate(description.document, description.arrays)

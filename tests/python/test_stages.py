@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdRender, UsdShade, UsdValidation
 
+import abbe
+
 ROOT = Path(__file__).resolve().parents[2]
 STAGES = ROOT / "stages"
 NAMES = ["prism", "ball", "lens", "gem"]
@@ -367,3 +369,12 @@ def test_gem_returns_the_light_of_its_face_after_total_reflection() -> None:
     left = [item for item in found if item is not None]
     assert len(left) >= 0.97 * len(found)
     assert sum(item[2] >= 2 for item in left) > 0.6 * len(left)
+
+
+def test_the_cemented_doublet_has_three_interfaces_and_fetch_offsets_everywhere() -> None:
+    names = ["interfaces", "dispersion_r", "dispersion_g", "dispersion_b"]
+    film = abbe.render(STAGES / "lens.usda", width=160, aovs=names)
+    glass = film["interfaces"][..., 0] > 0
+    assert np.unique(film["interfaces"][glass]).tolist() == [3]
+    for name in names[1:]:
+        assert film.valid(name)[glass].mean() > 0.99, name

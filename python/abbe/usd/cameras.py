@@ -20,9 +20,9 @@ _LISTED = 8
 # The camera that usdrecord frames with: GfCamera's defaults, in tenths of a stage unit.
 _HORIZONTAL_APERTURE = 20.955
 _VERTICAL_APERTURE = 15.2908
-# A box lower than this part of its depth is seen too nearly edge on to show what lies on it.
-_FLAT = 0.05
 _FOCAL_LENGTH = 50.0
+# A box lower than this part of its depth is seen too nearly edge on to show what lies on it.
+_FLAT = 0.2
 
 
 def all_cameras(stage: Any) -> list[Any]:
