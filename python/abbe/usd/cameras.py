@@ -111,8 +111,8 @@ def framed_camera(low: Any, high: Any, up_axis: str) -> dict[str, Any]:
     """Return a camera that sees the box from ``low`` to ``high`` as usdrecord's default one does.
 
     It looks along −z (along +y on a stage that is Z-up) from where the front face of the box fills the width of a 50 mm
-    lens (usdAppUtils/frameRecorder.cpp). Near and far planes enclose the box with room. Where that would show a flat box
-    edge on (a floor, a grid), it looks down at 45° instead, from where the whole box is in view.
+    lens (usdAppUtils/frameRecorder.cpp). Near and far planes enclose the box with room. Where that would show a flat
+    box edge on (a floor, a grid), it looks down at 45° instead, from where the whole box is in view.
     """
     low, high = Gf.Vec3d(*low), Gf.Vec3d(*high)
     centre, size = (low + high) / 2.0, high - low
