@@ -185,6 +185,7 @@ fn requests_are_checked() {
         "--sample-range 2:6",
         "aligned",
     );
+    says(Request { threads: Some(100_000), ..Request::default() }, "--threads", "at most");
     says(Request { crop: Some([5, 5, 5, 9]), ..Request::default() }, "--crop", "no pixel");
     says(Request { dispersion_scale: Some(f64::NAN), ..Request::default() }, "--dispersion-scale", "0 to 1000");
 }

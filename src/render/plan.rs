@@ -168,7 +168,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         conform_policy,
         samples,
         seed,
-        threads: request.threads.unwrap_or(0),
+        threads: settings::threads(request)?,
         integrator: integrator.name().to_owned(),
         layers,
         optics,

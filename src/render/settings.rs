@@ -16,6 +16,8 @@ use crate::spectrum::{self, Wavelength};
 const DEFAULT_WIDTH: u32 = 960;
 /// The largest image side: what an EXR window can address with room for arithmetic.
 const MAX_SIDE: u32 = 1 << 17;
+/// More threads than this would spend their time on each other: no machine has as many cores.
+const MAX_THREADS: usize = 1024;
 /// Wavelengths that a reference, a band or a channel may have, nm: the transport's.
 const SPECTRUM: [f64; 2] = [360.0, 830.0];
 /// AOV band unless chosen, nm.
@@ -153,6 +155,16 @@ pub(super) fn samples(request: &Request, attributes: &Attributes<'_>) -> Result<
                  its begin a multiple of it, so that parts merge to the same bits"
             ),
         )),
+    }
+}
+
+/// Threads to render with, 0 for all of the machine's.
+pub(super) fn threads(request: &Request) -> Result<usize> {
+    match request.threads.unwrap_or(0) {
+        threads if threads <= MAX_THREADS => Ok(threads),
+        threads => {
+            Err(Error::usage("--threads", format!("must be at most {MAX_THREADS}, not {threads}: 0 takes all cores")))
+        }
     }
 }
 
