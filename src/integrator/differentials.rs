@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 
 use super::chain::{Chain, Counters, End, Follower, SurfacePoint};
 use super::{Columns, Integrator, PreparedIntegrator, Task, Worker};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::aov::{AOVS, Aov, Family};
 use crate::film::pixel::PixelAccumulator;
 use crate::optics::IorJet;
@@ -16,7 +16,7 @@ use crate::ray::{
     ColumnSet, LambdaColumn, NoColumns, RayStart, ScreenColumns, SecondOrderColumns, Step, direction_derivative,
     direction_second_derivative, half_width, screen_motion, second_order_along,
 };
-use crate::scene::material::Kind;
+use crate::scene::material::{Kind, Material};
 use crate::scene::view::{Media, View};
 
 /// The integrator; it has no settings of its own.
@@ -121,6 +121,8 @@ struct Prepared<'a> {
     /// At the wavelengths of the R, G, B responses; empty unless a layer asks for it.
     channel_media: Vec<Media>,
     outputs: Vec<Output>,
+    /// Of every material; empty unless a layer asks for it.
+    abbe_numbers: Vec<Option<f64>>,
     /// Whether some layer tells about the first surface.
     needs_first: bool,
 }
@@ -129,6 +131,15 @@ impl<'a> Prepared<'a> {
     fn new(task: &'a Task<'a>) -> Result<Self> {
         let scene = task.view.scene;
         let media = |wavelength| Media::at(scene, wavelength, task.optics.dispersion_scale);
+        let abbe_number = |material: &Material| match &material.kind {
+            Kind::Dielectric { dispersion, .. } => {
+                let scaled = dispersion.scaled(task.optics.dispersion_scale);
+                Ok(scaled.map_err(|problem| Error::scene(&material.path, problem))?.abbe_number())
+            }
+            _ => Ok(None),
+        };
+        let has_abbe_number = task.aovs.iter().any(|aov| aov.name == "abbe_number");
+        let asked = if has_abbe_number { scene.materials.as_slice() } else { &[] };
         let channels: &[_] = if task.needs.retrace { &task.optics.channels } else { &[] };
         Ok(Self {
             task,
@@ -136,6 +147,7 @@ impl<'a> Prepared<'a> {
             media: media(task.optics.reference)?,
             channel_media: channels.iter().map(|&wavelength| media(wavelength)).collect::<Result<_>>()?,
             outputs: task.aovs.iter().map(|aov| Output::of(aov)).collect(),
+            abbe_numbers: asked.iter().map(abbe_number).collect::<Result<_>>()?,
             needs_first: task.aovs.iter().any(|aov| aov.family == Family::FirstSurface),
         })
     }
@@ -205,6 +217,8 @@ impl<C: ColumnSet> Carrier<'_, C> {
             End::Miss | End::Exhausted => None,
         };
         let first = if self.prepared.needs_first { chain.first.as_ref() } else { None };
+        // The first dielectric entered.
+        let dielectric = (chain.dielectric_id > 0).then(|| media.of_material(chain.dielectric_id));
         for (layer, &output) in self.prepared.outputs.iter().enumerate() {
             match output {
                 Output::DirectionByLambda => out.add(layer, sample.direction_by_lambda()),
@@ -221,20 +235,16 @@ impl<C: ColumnSet> Carrier<'_, C> {
                     out.add(layer, offset);
                 }
                 Output::Ior => {
-                    let ior = sample.dielectric().map(|_| media.of_material(chain.dielectric_id).ior);
+                    let ior = dielectric.map(|jet| jet.ior);
                     out.add(layer, scalar(ior));
                 }
                 Output::IorByLambda => {
-                    let dior = sample.dielectric().map(|_| media.of_material(chain.dielectric_id).dior_dlambda);
+                    let dior = dielectric.map(|jet| jet.dior_dlambda);
                     out.add(layer, scalar(dior));
                 }
                 Output::AbbeNumber => {
-                    let scale = task.optics.dispersion_scale;
-                    let number = sample.dielectric().and_then(|kind| match kind {
-                        Kind::Dielectric { dispersion, .. } => dispersion.scaled(scale).ok()?.abbe_number(),
-                        _ => None,
-                    });
-                    out.add(layer, scalar(number));
+                    let material = (chain.dielectric_id as usize).checked_sub(1);
+                    out.add(layer, scalar(material.and_then(|i| self.prepared.abbe_numbers[i])));
                 }
                 Output::Interfaces => out.add_first(layer, chain.interfaces),
                 Output::RoughInterfaces => out.add_first(layer, chain.rough_interfaces),
@@ -487,11 +497,5 @@ impl<C: ColumnSet> Sample<'_, C> {
             direction_second_derivative(along.momentum2, self.chain.direction, first, medium)
         };
         screen_motion(v_x, v_y, second, self.end.normal)
-    }
-
-    /// The first dielectric entered.
-    fn dielectric(&self) -> Option<&Kind> {
-        let id = self.chain.dielectric_id.checked_sub(1)?;
-        Some(&self.task.view.scene.materials[id as usize].kind)
     }
 }
