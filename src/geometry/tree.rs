@@ -107,13 +107,15 @@ impl Tree {
             })
             .collect();
         let binary = agglomerate(&boxes);
-        let ((nodes, depth), order) = match widen(&binary.nodes) {
+        let ((mut nodes, depth), order) = match widen(&binary.nodes) {
             Some(wide) => (wide, binary.primitive_indices),
             None => {
                 let (binary, order) = halve(&boxes);
                 (widen(&binary).expect("halving 2^31 primitives takes 31 binary levels"), order)
             }
         };
+        // Trees are built once and kept: what the vector grew beyond its end would be kept with them.
+        nodes.shrink_to_fit();
         Self { nodes, order, stack: stack_of(depth), scale, bounds: [all.min * scale, all.max * scale] }
     }
 }

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::Scene;
 use super::material::{Kind, Material};
 use crate::error::{Error, Result};
-use crate::geometry::{Aggregate, Departures, Hit, Instance, Ray};
+use crate::geometry::{Aggregate, Departures, Hit, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
 use crate::spectrum::Wavelength;
@@ -29,14 +29,10 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     /// `scene` about the world point `origin`.
     pub fn new(scene: &'a Scene, origin: DVec3) -> Self {
-        let instances: Vec<_> = scene
-            .objects
-            .iter()
-            .map(|object| Instance { shape: object.shape.clone(), world_from_object: object.world_from_object })
-            .collect();
-        let aggregate = Aggregate::build(&instances, origin);
+        let (singles, arrays) = scene.objects.instances();
+        let aggregate = Aggregate::with_arrays(&singles, arrays, origin);
         let touching = aggregate.touching(|object| {
-            let ids = &scene.objects[object as usize].material_ids;
+            let ids = scene.objects.ids(object).material_ids;
             ids.iter().any(|id| id.checked_sub(1).is_some_and(|i| scene.materials[i as usize].has_interior()))
         });
         Self { scene, aggregate, origin, touching }
@@ -49,7 +45,7 @@ impl<'a> View<'a> {
 
     /// `material_id` at `hit`, 0 for none.
     pub fn material_id(&self, hit: &Hit) -> u32 {
-        let ids = &self.scene.objects[hit.instance as usize].material_ids;
+        let ids = self.scene.objects.ids(hit.instance).material_ids;
         ids[self.slot(hit, ids) as usize]
     }
 
