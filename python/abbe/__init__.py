@@ -16,12 +16,14 @@ from . import schemas as _schemas
 from ._api import Plan, Progress, Scene, integrators, merge, render
 from ._core import Film, __version__
 from .errors import AbbeError, StageError, UsageError, UsdMissingError
+from .manifest import Manifest
 from .optics import Dispersion, Reflected, Refracted, Transferred, reflect, refract, transfer
 
 __all__ = [
     "AbbeError",
     "Dispersion",
     "Film",
+    "Manifest",
     "Plan",
     "Progress",
     "Reflected",
