@@ -183,7 +183,8 @@ def test_what_is_left_out_is_counted_or_named():
         "lights: not asked for": 2,
     }
     named = {warning["message"].split()[0]: warning for warning in warned(description, "unsupported-prim")}
-    assert set(named) == {"Cube", "BasisCurves", "PointInstancer"}
+    assert set(named) == {"Cube", "BasisCurves"}
+    assert warned(description, "instancer")[0]["places"] == ["</Scatter>.protoIndices"]
     assert named["Cube"]["count"] == 2 and named["Cube"]["places"] == ["</Cube>", "</Cube2>"]
     assert warned(description, "unknown-prim-type")[0]["places"] == ["</Unknown>"]
 
