@@ -146,6 +146,13 @@ impl Law {
         }
     }
 
+    pub(super) fn curvature_doubt(&self) -> Option<f64> {
+        match &self.0 {
+            Form::Table(law) => law.curvature_doubt(),
+            _ => None,
+        }
+    }
+
     pub(super) fn describe(&self) -> String {
         match &self.0 {
             Form::Constant(ior) => format!("constant, n = {ior}"),

@@ -19,7 +19,7 @@ pub(super) struct Table {
     spline: Spline,
     range: ValidRange,
     /// How much n'' of this spline differs from that of the spline through every second entry, both as root mean squares
-    /// over the part within 360–830 nm, relative to n''.
+    /// over the part within 360–830 nm.
     curvature_doubt: Option<f64>,
 }
 
@@ -54,6 +54,10 @@ impl Table {
 
     pub(super) fn range(&self) -> ValidRange {
         self.range
+    }
+
+    pub(super) fn curvature_doubt(&self) -> Option<f64> {
+        self.curvature_doubt
     }
 
     pub(super) fn at(&self, micrometers: f64) -> [f64; 3] {
@@ -118,7 +122,8 @@ fn extremes(&[_, c1, c2, c3]: &[f64; 4]) -> Vec<f64> {
 }
 
 /// How much n'' depends on the spacing of the entries. Truncation and the noise of rounded entries both enter; neither can
-/// be told from the table alone, so the difference is stated as it is.
+/// be told from the table alone, so the difference is stated as it is, relative to the coarser spline's n'': noise swells the
+/// finer one's.
 fn curvature_doubt(spline: &Spline, points: &[[f64; 2]]) -> Option<f64> {
     if points.len() < FEWEST_TO_DOUBT {
         return None;
@@ -131,7 +136,7 @@ fn curvature_doubt(spline: &Spline, points: &[[f64; 2]]) -> Option<f64> {
     {
         let (fine, coarse) = (spline.at(x)[2], coarse.at(x)[2]);
         difference += (fine - coarse) * (fine - coarse);
-        size += fine * fine;
+        size += coarse * coarse;
     }
     (size > 0.0).then(|| (difference / size).sqrt())
 }
