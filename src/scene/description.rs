@@ -208,9 +208,13 @@ pub struct Material {
     /// Authored `inputs:abbe:…` of the Material's interface, keyed without `inputs:`.
     #[serde(default)]
     pub interface_abbe: AuthoredMap,
-    /// The surface shader that the chosen terminal leads to.
+    /// The surface shader that the first terminal leads to, in the order `outputs:abbe:surface`,
+    /// `outputs:mtlx:surface`, `outputs:surface`, and then the other render contexts.
     #[serde(default)]
     pub surface: Option<Shader>,
+    /// The shaders of the other terminals, in that order: used where `surface` is of an unknown kind.
+    #[serde(default)]
+    pub alternatives: Vec<Shader>,
 }
 
 /// A surface shader as authored.

@@ -5,7 +5,8 @@
 //! a value, or is not there, has the definition's default. An input driven by a network has it too, with a warning.
 
 use crate::diagnostics::Diagnostics;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::optics::media::Priority;
 use crate::scene::description::Shader;
 
 use super::values::Values;
@@ -78,6 +79,11 @@ impl<'a> Surface<'a> {
     pub(super) fn of(shader: &'a Shader) -> Option<Self> {
         let dialect = Dialect::of(&shader.id)?;
         Some(Self { dialect, shader, values: Values::new(&shader.inputs, &shader.path, "inputs:") })
+    }
+
+    /// The shader itself.
+    pub(super) fn shader(&self) -> &'a Shader {
+        self.shader
     }
 
     /// What the surface does to light.
@@ -351,16 +357,15 @@ impl<'a> Surface<'a> {
         driven
     }
 
-    /// Inputs that change what is glass and have no counterpart here.
-    pub(super) fn warn_of_unread(&self, diagnostics: &mut Diagnostics) -> Result<(), Error> {
-        const PRIORITY: &str = "dielectric_priority";
-        if self.shader.id.starts_with("arnold:") && self.values.int(PRIORITY)?.is_some_and(|priority| priority != 0) {
-            diagnostics.warn(
-                "unread-input",
-                self.values.place(PRIORITY),
-                "Arnold's priorities (higher wins) are not read: author abbe:dielectricPriority (lower wins)",
-            );
-        }
-        Ok(())
+    /// The dielectric priority and where it stands; `None` where none is set.
+    pub(super) fn priority(&self) -> Result<Option<(Priority, String)>> {
+        const NAME: &str = "dielectric_priority";
+        let number = match self.shader.id.as_str() {
+            "arnold:standard_surface" => self.values.int(NAME)?.unwrap_or(0),
+            _ => 0,
+        };
+        let priority = Priority::higher_wins(number);
+        let source = || format!("{number} (higher wins) from {}", self.values.place(NAME));
+        Ok((priority != Priority::UNSET).then(|| (priority, source())))
     }
 }
