@@ -16,7 +16,7 @@ use crate::optics::dispersion::Dispersion;
 use crate::optics::media::Priority;
 use crate::scene::description::{self, Shader};
 
-use dialect::{Response, Surface};
+use dialect::{Attenuation, Response, Surface};
 use law::Authored;
 use values::Values;
 
@@ -135,11 +135,17 @@ fn classify(
                 dispersion(&surface, surface.shader(), &authored, context.scalar_ior, diagnostics)?;
             let wall = if thin_walled { "thin-walled dielectric, followed straight through" } else { "dielectric" };
             let lobe = if rough { ", rough" } else { "" };
+            let absorption = match surface.attenuation(context, diagnostics)? {
+                Some(Attenuation { color: [r, g, b], distance, place }) if !thin_walled => {
+                    format!("; absorbs to ({r}, {g}, {b}) over {distance} by {place}")
+                }
+                _ => String::new(),
+            };
             let (priority, rank) = match authored.priority()?.or(surface.priority()?) {
                 Some((priority, source)) => (priority, format!("; priority {source}")),
                 None => (Priority::UNSET, String::new()),
             };
-            let chosen = format!("{wall} ({why}{lobe}): {source}{rank}");
+            let chosen = format!("{wall} ({why}{lobe}): {source}{absorption}{rank}");
             (Kind::Dielectric { dispersion, priority, rough, thin_walled }, chosen)
         }
         Response::Metal { why, rough: false } => (Kind::Mirror, format!("mirror: {why}, smooth")),
