@@ -4,7 +4,8 @@ use std::cmp::Ordering;
 use std::fmt;
 
 use super::key;
-use crate::spectrum::lines;
+use crate::optics::dispersion::{Dispersion, Law, OutOfRange, ValidRange};
+use crate::spectrum::{Wavelength, lines};
 
 /// A material of the catalogue. It is a line of the data and as cheap to copy as a string slice; what is asked of it is
 /// parsed then.
@@ -139,10 +140,8 @@ impl Entry {
     /// What it is called without maker or page: `N-BK7`, `diamond`.
     pub fn bare_name(&self) -> &'static str {
         let name = self.name();
-        match name.split_once(':') {
-            Some((before, after)) => [before, after].into_iter().find(|part| key(part) == self.key()).unwrap_or(name),
-            None => name,
-        }
+        let part = name.split(':').find(|part| key(part) == self.key());
+        part.unwrap_or(name)
     }
 
     /// The maker, of a maker's glass.
@@ -154,6 +153,7 @@ impl Entry {
         self.cell(Cell::Key)
     }
 
+    #[cfg(test)]
     pub(super) fn qualifier(&self) -> &'static str {
         self.cell(Cell::Qualifier)
     }
@@ -219,6 +219,34 @@ impl Entry {
 
     fn number(&self, cell: Cell) -> Option<f64> {
         self.cell(cell).parse().ok()
+    }
+
+    /// Where the source's n(λ) holds: the range of its formula, the ends of its table.
+    pub fn valid_range(&self) -> ValidRange {
+        let end =
+            |cell| Wavelength::from_nanometers(self.number(cell).expect("every entry has a valid range (tested)"));
+        ValidRange { from: end(Cell::ValidFrom), to: end(Cell::ValidTo) }
+    }
+
+    /// n(λ) as the source states it.
+    pub fn law(&self) -> Result<Law, String> {
+        let cell = self.cell(Cell::Law);
+        match cell.split_once(' ') {
+            Some(("formula", rest)) => {
+                let (number, coefficients) = rest.split_once(' ').unwrap_or((rest, ""));
+                let number = number.parse().map_err(|_| format!("formula {number} is none"))?;
+                Law::formula(number, &numbers(coefficients).collect::<Vec<_>>())
+            }
+            Some(("table", rest)) => Law::table(&pairs(rest)),
+            _ => Err(format!("{cell} is no law")),
+        }
+        .map_err(|problem| format!("{}: {problem}", self.name()))
+    }
+
+    /// n(λ) in its valid range, with what becomes of wavelengths outside.
+    pub fn dispersion(&self, out_of_range: OutOfRange) -> Result<Dispersion, String> {
+        Dispersion::new(self.law()?, Some(self.valid_range()), out_of_range)
+            .map_err(|problem| format!("{}: {problem}", self.name()))
     }
 
     /// k(λ) as pairs of nm and k, increasing in λ; `None` where the source has none, or nothing but zeros.

@@ -332,7 +332,7 @@ def maker_lines(catalog: list) -> tuple[list[Line], list[tuple[str, str]], list[
             left_out.append(f"{name}: {fault}")
             continue
         if key(page["PAGE"]) != key(bare):
-            aliases.append((page["PAGE"], name))
+            aliases += [(page["PAGE"], name), (f"{maker.name}:{page['PAGE']}", name)]
     return lines, aliases, left_out
 
 

@@ -3,6 +3,7 @@
 
 use super::lookup::{Record, records};
 use super::*;
+use crate::optics::dispersion::OutOfRange;
 
 #[test]
 fn lines_are_sorted_and_keys_are_those_of_the_names() {
@@ -43,6 +44,8 @@ fn every_entry_can_be_read_and_found_by_its_name() {
         assert!(!entry.title().is_empty() && !entry.reference().is_empty(), "{entry:?}");
         assert!(entry.status() == Status::Unknown || entry.maker().is_some(), "{entry:?}");
         assert!(key(entry.bare_name()) == entry.key(), "{entry:?}");
+        let law = entry.dispersion(OutOfRange::Clamp).unwrap_or_else(|problem| panic!("{problem}"));
+        assert_eq!(law.valid_range(), Some(entry.valid_range()));
         assert!(entry.nd() > 0.0 && entry.nd() < 10.0, "{entry:?}");
         assert!(entry.stated_nd().is_some() == entry.stated_vd().is_some(), "{entry:?}");
         if let Some(table) = entry.extinction() {
