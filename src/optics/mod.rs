@@ -4,6 +4,7 @@
 //! An index is an `ior`; `_i` is the side of the incident ray, `_t` the other one. Cosines at an interface are those of the
 //! acute angles (positive) wherever they have a name; in momentum form g = K·N is negative because the normal faces the ray.
 
+pub mod catalog;
 pub mod dispersion;
 pub mod media;
 
