@@ -58,6 +58,10 @@ class MaterialReader:
             result.append(None)
         return result
 
+    def index(self, prim: Any) -> int:
+        """Return the index of a Material prim, which need not be bound."""
+        return self._index(prim)
+
     def _index(self, prim: Any) -> int:
         key = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         index = self._index_by_prim.get(key)
