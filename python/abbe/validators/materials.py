@@ -18,7 +18,8 @@ GLASS = "abbe:glass"
 # Kinds of the core's warnings that other validators tell of.
 _IDLE = "idle-dispersion"
 _UNREAD = "unread-attribute"
-_UNSUPPORTED = "unsupported-shader"
+# Nothing is wrong with a texture or another renderer's shader, unless somebody has glass in mind.
+_HARMLESS = ("textured-input", "unsupported-shader")
 # What is given for millimetres, or for a wavelength, whatever the stage's unit is.
 _PHYSICAL = ("abbe:internalTransmittance:table", "abbe:extinction:table", GLASS)
 
@@ -34,8 +35,8 @@ def dispersion(reading: Reading) -> Iterator[Finding]:
     for material in reading.materials.values():
         for remark in material.remarks:
             is_elsewhere = remark.kind in (_IDLE, _UNREAD) or _is_about_glass(remark)
-            # That a shader is another renderer's is no fault, unless somebody has our glass in mind.
-            if not is_elsewhere and (remark.kind != _UNSUPPORTED or material.has_ours):
+            is_harmless = remark.kind in _HARMLESS and not (material.is_solid or material.has_ours)
+            if not (is_elsewhere or is_harmless):
                 yield reading.finding("abbe:Dispersion", remark)
 
 

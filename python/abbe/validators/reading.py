@@ -112,6 +112,20 @@ class Reading:
             return error
 
     @cached_property
+    def refusal(self) -> Remark | None:
+        """Why the stage cannot be read or its geometry cannot be used; materials are looked at one by one."""
+        if isinstance(self.described, StageError):
+            return self.error(self.described)
+        document = self.described.document
+        groups = [{**group, "items": [_bare(item) for item in group["items"]]} for group in document["groups"]]
+        bare = Description({**document, "groups": groups, "materials": []}, self.described.arrays)
+        try:
+            _core.Scene(bare.to_json(), bare.arrays)
+        except AbbeError as error:
+            return self.error(error)
+        return None
+
+    @cached_property
     def materials(self) -> dict[str, CompiledMaterial]:
         """Every Material prim by path, used or not."""
         reader = MaterialReader(self.time, Diagnostics(), tokens.FULL_PURPOSE)
@@ -183,7 +197,7 @@ class Reading:
         if match:
             path = Sdf.Path(match["prim"])
             path = path.AppendProperty(match["name"]) if match["name"] else path
-        elif place.startswith("/") and Sdf.Path.IsValidPathString(place):
+        elif place != self.source and place.startswith("/") and Sdf.Path.IsValidPathString(place):
             path = Sdf.Path(place)
             prim = path.GetPrimPath()
             place = f"<{prim}>.{path.name}" if path.IsPropertyPath() else f"<{prim}>"
@@ -254,6 +268,10 @@ _CAMERA: Mapping[str, Any] = {
     "vertical_aperture": 15.2908,
     "focal_length": 50.0,
 }
+
+
+def _bare(item: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in item.items() if name not in ("material", "subset_materials")}
 
 
 def _warnings(warning: Mapping[str, Any]) -> Iterator[Remark]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
 from .. import _core
-from ..errors import StageError
 from ..usd import tokens
 from ..usd._pxr import Sdf, UsdRender
 from ..usd.cameras import all_cameras
@@ -19,12 +19,10 @@ __all__ = ["camera", "render_settings", "render_vars", "stage"]
 
 
 def stage(reading: Reading) -> Iterator[Finding]:
-    """Tell why the stage cannot be read at all, if it cannot."""
-    if isinstance(reading.described, StageError):
-        remark = reading.error(reading.described)
-        # What the settings are refused for is told of there, for each of them.
-        if (remark.place, remark.message) not in {(other.place, other.message) for other in reading.render_remarks}:
-            yield reading.finding("abbe:Stage", remark)
+    """Tell why the stage cannot be read, or its geometry not be used, if so."""
+    # What the settings are refused for is told of there, for each of them.
+    if reading.refusal is not None and reading.refusal not in reading.render_remarks:
+        yield reading.finding("abbe:Stage", reading.refusal)
 
 
 def camera(reading: Reading) -> Iterator[Finding]:
@@ -51,8 +49,11 @@ def render_vars(reading: Reading) -> Iterator[Finding]:
         finding = reading.finding("abbe:RenderVars", remark)
         if remark.kind == "unavailable-render-var":
             source = str(prim.GetAttribute(tokens.SOURCE_NAME).Get() or prim.GetName())
-            message = f"{finding.message}{closest(source, names)}"
-            finding = reading.found("abbe:RenderVars", remark.kind, remark.severity, remark.place, message)
+            if source in names:
+                # Light transport, for instance, which another integrator may have.
+                finding = dataclasses.replace(finding, severity="info")
+            else:
+                finding = dataclasses.replace(finding, message=f"{finding.message}{closest(source, names)}")
         yield finding
 
 
