@@ -68,6 +68,7 @@ impl Stagehand {
                 connected: BTreeMap::new(),
                 abbe: BTreeMap::new(),
             }),
+            alternatives: Vec::new(),
         });
         self.document.materials.len() - 1
     }

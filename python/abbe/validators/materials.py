@@ -10,7 +10,7 @@ from ..usd import tokens
 from ..usd._pxr import UsdShade
 from ..usd.values import place
 from . import Finding
-from .reading import CompiledMaterial, Reading, Remark
+from .reading import CompiledMaterial, Reading, Remark, shared_source
 
 __all__ = ["attribute_names", "closest", "dispersion", "glass_name", "units", "unused_dispersion"]
 
@@ -106,7 +106,7 @@ def attribute_names(reading: Reading) -> Iterator[Finding]:
     """Tell of attributes in our namespace that abbe does not read: misspelt, or on the wrong prim."""
     seen = set()
     for prim in reading.prims:
-        source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+        source = shared_source(prim)
         if source in seen:
             continue
         for item in prim.GetAuthoredPropertiesInNamespace(tokens.ABBE):

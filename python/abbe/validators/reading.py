@@ -24,7 +24,7 @@ from ..usd.render import all_settings, read_settings
 from ..usd.stage import OpenedStage, open_stage, quiet_usd, source_name, stage_metadata, stage_time
 from . import Finding, Severity
 
-__all__ = ["CompiledMaterial", "Reading", "Remark", "read"]
+__all__ = ["CompiledMaterial", "Reading", "Remark", "read", "shared_source"]
 
 # What the core says of an open mesh of a material that has an inside, and of no other.
 OPEN_GLASS = "open-glass-mesh"
@@ -75,9 +75,15 @@ class CompiledMaterial:
         """Whether any ``abbe:`` attribute is authored on it or its shader."""
         return any(self._places())
 
+    @property
+    def surfaces(self) -> list[Mapping[str, Any]]:
+        """The surface shaders of its terminals, the first first."""
+        surface = self.document.get("surface")
+        return [] if surface is None else [surface, *self.document.get("alternatives", [])]
+
     def _places(self) -> list[Mapping[str, Any]]:
-        surface = self.document.get("surface") or {}
-        return [self.document.get("abbe", {}), surface.get("abbe", {}), self.document.get("interface_abbe", {})]
+        surfaces = [surface.get("abbe", {}) for surface in self.surfaces]
+        return [self.document.get("abbe", {}), *surfaces, self.document.get("interface_abbe", {})]
 
 
 class Reading:
@@ -127,12 +133,16 @@ class Reading:
 
     @cached_property
     def materials(self) -> dict[str, CompiledMaterial]:
-        """Every Material prim by path, used or not."""
+        """Every Material prim by path, used or not; those of instances once."""
+        described = self.described
+        documents = {} if isinstance(described, StageError) else {m["path"]: m for m in described.document["materials"]}
+        seen = {shared_source(self.stage.GetPrimAtPath(path)) for path in documents}
         reader = MaterialReader(self.time, Diagnostics(), tokens.FULL_PURPOSE)
-        prims = [prim for prim in self.prims if prim.IsA(UsdShade.Material)]
-        indices = [reader.index(prim) for prim in prims]
-        compiled = [self._compile(document) for document in reader.materials]
-        return {str(prim.GetPath()): compiled[index] for prim, index in zip(prims, indices, strict=True)}
+        for prim in self.prims:
+            if prim.IsA(UsdShade.Material) and shared_source(prim) not in seen:
+                seen.add(shared_source(prim))
+                documents[str(prim.GetPath())] = reader.unbound(prim)
+        return {path: self._compile(document) for path, document in documents.items()}
 
     @cached_property
     def prims(self) -> list[Any]:
@@ -268,6 +278,11 @@ _CAMERA: Mapping[str, Any] = {
     "vertical_aperture": 15.2908,
     "focal_length": 50.0,
 }
+
+
+def shared_source(prim: Any) -> Any:
+    """Return what a prim shares with those of other instances, or itself."""
+    return prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
 
 
 def _bare(item: Mapping[str, Any]) -> dict[str, Any]:

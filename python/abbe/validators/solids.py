@@ -260,10 +260,8 @@ def _priority(material: CompiledMaterial) -> Any:
     ours = material.authored("abbe:dielectricPriority")
     if ours:
         return ours
-    inputs = (material.document.get("surface") or {}).get("inputs", {})
-    return next(
-        (value["value"] for name, value in inputs.items() if "priority" in name.lower() and value["value"]), None
-    )
+    inputs = [item for surface in material.surfaces for item in surface.get("inputs", {}).items()]
+    return next((value["value"] for name, value in inputs if "priority" in name.lower() and value["value"]), None)
 
 
 def _crosses(body: _Body, other: _Body) -> bool:

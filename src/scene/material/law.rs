@@ -3,6 +3,7 @@
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::optics::dispersion::Dispersion;
+use crate::optics::media::Priority;
 use crate::spectrum;
 
 use super::values::Values;
@@ -204,14 +205,16 @@ impl<'a> Authored<'a> {
         place.map_or_else(String::new, |values| values.place(SCALE))
     }
 
-    /// The dielectric priority, 0 (unset) if not authored.
-    pub(super) fn priority(&self) -> Result<i32> {
+    /// The dielectric priority and where it stands; `None` where none is set (0 is unset).
+    pub(super) fn priority(&self) -> Result<Option<(Priority, String)>> {
         for values in &self.places {
-            if let Some(priority) = values.int(PRIORITY)? {
-                return Ok(priority);
+            if let Some(number) = values.int(PRIORITY)? {
+                let priority = Priority::lower_wins(number);
+                return Ok((priority != Priority::UNSET)
+                    .then(|| (priority, format!("{number} (lower wins) from {}", values.place(PRIORITY)))));
             }
         }
-        Ok(0)
+        Ok(None)
     }
 }
 

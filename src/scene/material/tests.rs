@@ -5,6 +5,8 @@ use serde_json::json;
 use super::*;
 use crate::spectrum::lines;
 
+const CONTEXT: Context = Context { scalar_ior: ScalarIor::Constant, meters_per_unit: 0.01 };
+
 fn material(document: serde_json::Value) -> description::Material {
     serde_json::from_value(document).expect("the test's document follows the schema")
 }
@@ -44,7 +46,7 @@ fn token(value: &str) -> serde_json::Value {
 
 fn compiled(material: &description::Material) -> (Material, Diagnostics) {
     let mut diagnostics = Diagnostics::default();
-    let material = compile(material, ScalarIor::Constant, &mut diagnostics).expect("compiles");
+    let material = compile(material, &CONTEXT, &mut diagnostics).expect("compiles");
     (material, diagnostics)
 }
 
@@ -62,7 +64,7 @@ fn law(material: &description::Material) -> Dispersion {
 }
 
 fn refused(material: &description::Material) -> String {
-    compile(material, ScalarIor::Constant, &mut Diagnostics::default()).expect_err("is refused").to_string()
+    compile(material, &CONTEXT, &mut Diagnostics::default()).expect_err("is refused").to_string()
 }
 
 /// Differences of a few units in the last place of numbers near 1.
@@ -218,16 +220,18 @@ fn open_pbr_divides_the_abbe_number_by_the_scale() {
 #[test]
 fn open_pbr_specular_weight_moves_the_index() {
     // n = 1.5: F0 = 0.04, ε = √(0.25·0.04) = 0.1, n' = 1.1/0.9. Below 1 the sign of ε follows: n = 1/1.5 gives 0.9/1.1.
-    let index = |ior: f64| {
-        law(&shaded(
+    let index = |ior: f64, warnings: &[&str]| {
+        let glass = shaded(
             "ND_open_pbr_surface_surfaceshader",
             json!({"transmission_weight": double(1.0), "specular_ior": double(ior), "specular_weight": double(0.25)}),
-        ))
-        .at(lines::D)
-        .ior
+        );
+        let (glass, diagnostics) = compiled(&glass);
+        assert_eq!(kinds_of(&diagnostics), warnings);
+        let Kind::Dielectric { dispersion, .. } = glass.kind else { panic!("{}", glass.chosen) };
+        dispersion.at(lines::D).ior
     };
-    close(index(1.5), 1.1 / 0.9, 14);
-    close(index(1.0 / 1.5), 0.9 / 1.1, 14);
+    close(index(1.5, &[]), 1.1 / 0.9, 14);
+    close(index(1.0 / 1.5, &["suspect-ior"]), 0.9 / 1.1, 14);
 }
 
 #[test]
@@ -287,10 +291,10 @@ fn thin_walls_and_cut_outs() {
 
 #[test]
 fn unknown_shaders_and_missing_surfaces_are_opaque() {
-    let (unknown, diagnostics) = compiled(&shaded("PxrSurface", json!({})));
+    let (unknown, diagnostics) = compiled(&shaded("PxrDiffuse", json!({})));
     assert!(matches!(unknown.kind, Kind::Opaque));
     assert_eq!(kinds_of(&diagnostics), ["unsupported-shader"]);
-    assert!(diagnostics.warnings()[0].to_string().starts_with("</M/S>: shader 'PxrSurface'"));
+    assert!(diagnostics.warnings()[0].to_string().starts_with("</M/S>: shader 'PxrDiffuse'"));
     let (bare, diagnostics) = compiled(&material(json!({"path": "/M"})));
     assert!(matches!(bare.kind, Kind::Opaque) && diagnostics.is_empty());
     let idle = material(json!({"path": "/M", "abbe": {"abbe:dispersion:vd": double(30.0)}}));
@@ -321,7 +325,7 @@ fn single_precision_and_misspelt_attributes_are_named() {
 #[test]
 fn priority_is_read_from_the_first_place_that_authors_it() {
     let (glass, _) = compiled(&preview(json!({"abbe:dielectricPriority": {"type": "int", "value": 3}})));
-    assert!(matches!(glass.kind, Kind::Dielectric { priority: 3, .. }));
+    assert!(matches!(glass.kind, Kind::Dielectric { priority, .. } if priority == Priority::lower_wins(3)));
 }
 
 #[test]
@@ -370,4 +374,47 @@ fn scalar_ior_policies_that_need_the_catalogue_are_usage_errors() {
         assert_eq!(error.exit_code(), 2);
         assert!(error.to_string().starts_with("--scalar-ior: "), "{error}");
     }
+}
+
+#[test]
+fn the_first_terminal_that_is_understood_is_used() {
+    let mut glass = shaded("Unheard_of", json!({}));
+    glass.alternatives = vec![
+        serde_json::from_value(shader("Unknown_too", json!({}))).expect("is a shader"),
+        serde_json::from_value(shader("UsdPreviewSurface", json!({"opacity": float(0.0), "ior": float(1.7)})))
+            .expect("is a shader"),
+        serde_json::from_value(shader("ND_gltf_pbr_surfaceshader", json!({}))).expect("is a shader"),
+    ];
+    let (found, diagnostics) = compiled(&glass);
+    assert!(diagnostics.is_empty(), "{:?}", diagnostics.warnings());
+    let Kind::Dielectric { dispersion, .. } = found.kind else { panic!("{}", found.chosen) };
+    close(dispersion.at(lines::D).ior, 1.7, 15);
+    assert!(
+        found.chosen.contains("UsdPreviewSurface through outputs:surface")
+            && found.chosen.contains("Unheard_of, Unknown_too"),
+        "{}",
+        found.chosen
+    );
+    glass.alternatives.truncate(1);
+    let (unknown, diagnostics) = compiled(&glass);
+    assert_eq!(kinds_of(&diagnostics), ["unsupported-shader", "unsupported-shader"]);
+    assert_eq!(unknown.chosen, "opaque: shader 'Unheard_of', 'Unknown_too' is not understood");
+}
+
+#[test]
+fn priorities_of_arnold_let_the_higher_win_and_ours_come_first() {
+    let priority = |glass: &description::Material| match compiled(glass).0.kind {
+        Kind::Dielectric { priority, .. } => priority,
+        kind => panic!("{kind:?}"),
+    };
+    let int = |value: i32| json!({"type": "int", "value": value});
+    let mut arnold =
+        shaded("arnold:standard_surface", json!({"transmission": float(1.0), "dielectric_priority": int(2)}));
+    assert_eq!(priority(&arnold), Priority::higher_wins(2));
+    assert!(compiled(&arnold).0.chosen.ends_with("; priority 2 (higher wins) from </M/S>.inputs:dielectric_priority"));
+    arnold.abbe.insert(
+        "abbe:dielectricPriority".to_owned(),
+        description::Authored { type_name: "int".to_owned(), value: json!(5) },
+    );
+    assert_eq!(priority(&arnold), Priority::lower_wins(5));
 }

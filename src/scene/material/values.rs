@@ -55,6 +55,21 @@ impl<'a> Values<'a> {
         number.map(Some).ok_or_else(|| self.error(name, "author a finite number"))
     }
 
+    /// A colour, or one number for a grey; alpha is left out.
+    pub(super) fn color(&self, name: &str) -> Result<Option<[f64; 3]>> {
+        let Some(authored) = self.map.get(name) else { return Ok(None) };
+        let color = match &authored.value {
+            Value::Array(parts) => match parts[..] {
+                [ref r, ref g, ref b] | [ref r, ref g, ref b, _] => {
+                    finite(r).zip(finite(g)).zip(finite(b)).map(|((r, g), b)| [r, g, b])
+                }
+                _ => None,
+            },
+            value => finite(value).map(|grey| [grey; 3]),
+        };
+        color.map(Some).ok_or_else(|| self.error(name, "author a colour of three finite numbers"))
+    }
+
     /// A number declared `double` by the schema: single precision is accepted with a warning.
     pub(super) fn double(&self, name: &str, diagnostics: &mut Diagnostics) -> Result<Option<f64>> {
         self.warn_of_single_precision(name, diagnostics);
