@@ -208,11 +208,11 @@ pub struct Material {
     /// Authored `inputs:abbe:…` of the Material's interface, keyed without `inputs:`.
     #[serde(default)]
     pub interface_abbe: AuthoredMap,
-    /// The surface shader that the first terminal leads to, in the order `outputs:abbe:surface`,
-    /// `outputs:mtlx:surface`, `outputs:surface`, and then the other render contexts.
+    /// The surface shader of the first terminal that leads to one: ours, MaterialX', the universal one, then those of
+    /// other render contexts by name.
     #[serde(default)]
     pub surface: Option<Shader>,
-    /// The shaders of the other terminals, in that order: used where `surface` is of an unknown kind.
+    /// The surface shaders of the terminals after it, in the same order, each shader once.
     #[serde(default)]
     pub alternatives: Vec<Shader>,
 }
@@ -225,7 +225,8 @@ pub struct Shader {
     pub path: String,
     /// `info:id`, for instance `ND_open_pbr_surface_surfaceshader`.
     pub id: String,
-    /// The terminal it was found through: `outputs:abbe:surface`, `outputs:mtlx:surface` or `outputs:surface`.
+    /// The terminal it was found through: `outputs:abbe:surface`, `outputs:mtlx:surface`, `outputs:surface` or another
+    /// render context's, such as `outputs:arnold:surface`.
     pub terminal: String,
     /// Authored constant inputs by name without `inputs:`, connections to constants followed.
     #[serde(default)]
