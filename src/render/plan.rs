@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::request::Request;
 use super::settings::{self, Attributes};
+use super::validity;
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
@@ -143,6 +144,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let aovs: Vec<&Aov> = layers.iter().map(|layer| layer.aov).collect();
     let dispersive = dispersive_material(scene, &optics);
     let needs = integrator.needs(&aovs, dispersive.is_some());
+    validity::check(scene, &optics, &needs, &aovs)?;
     let (carried, skipped) = reasons(scene, integrator, &layers, &needs, dispersive, &optics);
     let seed = match (request.seed, attributes.integer("abbe:seed")?) {
         (Some(seed), _) => seed,

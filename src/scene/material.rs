@@ -135,8 +135,10 @@ fn classify(
                 dispersion(&surface, surface.shader(), &authored, context.scalar_ior, diagnostics)?;
             let wall = if thin_walled { "thin-walled dielectric, followed straight through" } else { "dielectric" };
             let lobe = if rough { ", rough" } else { "" };
-            let absorption = match surface.attenuation(context, diagnostics)? {
-                Some(Attenuation { color: [r, g, b], distance, place }) if !thin_walled => {
+            let absorption = match (authored.absorption(diagnostics)?, surface.attenuation(context, diagnostics)?) {
+                _ if thin_walled => String::new(),
+                (Some(stated), _) => format!("; absorbs by {}", stated.place()),
+                (None, Some(Attenuation { color: [r, g, b], distance, place })) => {
                     format!("; absorbs to ({r}, {g}, {b}) over {distance} by {place}")
                 }
                 _ => String::new(),
