@@ -5,6 +5,7 @@
 //! acute angles (positive) wherever they have a name; in momentum form g = K·N is negative because the normal faces the ray.
 
 pub mod absorption;
+pub mod catalog;
 pub mod dispersion;
 pub mod media;
 
