@@ -8,6 +8,7 @@ pub mod plan;
 pub mod request;
 mod settings;
 pub mod trace;
+mod validity;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

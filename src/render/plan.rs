@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::request::Request;
 use super::settings::{self, Attributes};
+use super::validity;
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
@@ -146,6 +147,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let absorbing = scene.materials.iter().find(|material| absorbs(material));
     let mut needs = integrator.needs(&aovs, dispersive.is_some());
     needs.transmittance &= absorbing.is_some();
+    validity::check(scene, &optics, &needs, &aovs)?;
     let (carried, skipped) = reasons(scene, integrator, &layers, &needs, [dispersive, absorbing], &optics);
     let seed = match (request.seed, attributes.integer("abbe:seed")?) {
         (Some(seed), _) => seed,

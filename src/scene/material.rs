@@ -139,13 +139,14 @@ fn classify(
                 dispersion(&surface, surface.shader(), &authored, context.scalar_ior, diagnostics)?;
             let wall = if thin_walled { "thin-walled dielectric, followed straight through" } else { "dielectric" };
             let lobe = if rough { ", rough" } else { "" };
-            let (absorption, fades) = match absorption::absorption(&surface, context, diagnostics)? {
-                Some((absorption, place)) if !thin_walled => {
-                    let fades = format!("; {} from {place}", absorption.describe());
-                    (Some(absorption), fades)
-                }
-                _ => (None, String::new()),
-            };
+            let (absorption, fades) =
+                match absorption::absorption(&surface, &authored, thin_walled, context, diagnostics)? {
+                    Some((absorption, place)) => {
+                        let fades = format!("; {} from {place}", absorption.describe());
+                        (Some(absorption), fades)
+                    }
+                    None => (None, String::new()),
+                };
             let (priority, rank) = match authored.priority()?.or(surface.priority()?) {
                 Some((priority, source)) => (priority, format!("; priority {source}")),
                 None => (Priority::UNSET, String::new()),
