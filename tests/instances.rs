@@ -3,23 +3,11 @@
 mod support;
 
 use abbe::scene::Scene;
-use abbe::scene::description::{Array, Description, Element, Group, Instances, Placement, Target};
+use abbe::scene::description::{Array, Description, Element, Group, Instances, Placement};
 use glam::{DAffine3, DMat3, DMat4, DVec3};
 use support::{BK7, Stagehand, floats, integers, rendered, request};
 
 const AOVS: [&str; 5] = ["position", "refracted_position", "dispersion", "prim_id", "material_id"];
-
-fn placement(path: &str, target: Target, transform: DMat4, material: Option<usize>) -> Placement {
-    Placement {
-        path: path.into(),
-        target,
-        transform: Some(transform.to_cols_array()),
-        instance: None,
-        material,
-        subset_materials: vec![],
-        double_sided: false,
-    }
-}
 
 fn rows(places: &[DAffine3]) -> Array {
     let rows = places.iter().map(DAffine3::to_cols_array).collect();

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::description::{self, Array, Description, Document, Element};
 use super::manifest::Manifest;
-use super::material::{self, Material, ScalarIor};
+use super::material::{self, Context, Material, ScalarIor};
 use super::objects::{Object, ObjectArray, Objects, PartIds};
 use super::unroll::{self, Placed, Unrolled};
 use super::{Counts, Scene};
@@ -331,9 +331,10 @@ fn build_materials<'a>(
     }
     let mut materials = Vec::new();
     let mut ids = vec![0; document.materials.len()];
+    let context = Context { scalar_ior: ScalarIor::default(), meters_per_unit: document.stage.meters_per_unit };
     for (i, authored) in document.materials.iter().enumerate() {
         if used[i] {
-            materials.push(material::compile(authored, ScalarIor::default(), diagnostics)?);
+            materials.push(material::compile(authored, &context, diagnostics)?);
             ids[i] = materials.len() as u32;
         }
     }

@@ -107,11 +107,8 @@ class InstancerReader:
         mask = self._mask(prim, count)
         valid = (prototypes >= 0) & (prototypes < known)
         if not valid.all():
-            self._warn(
-                prim,
-                tokens.PROTO_INDICES,
-                f"{count - int(valid.sum())} of {count} elements name no prototype (0 to {known - 1}); they are left out",
-            )
+            strays = f"{count - int(valid.sum())} of {count} elements"
+            self._warn(prim, tokens.PROTO_INDICES, f"{strays} name no prototype (0 to {known - 1}); they are left out")
             mask = valid if mask is None else mask & valid
         used = np.unique(prototypes if mask is None else prototypes[mask])
         unused = known - len(used)

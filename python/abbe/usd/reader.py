@@ -376,7 +376,7 @@ class _Walk:
         return None if box is None else _finite_box(box[0].tolist(), box[1].tolist())
 
     def _box(self, index: int, corners: dict[int, Any], boxes: dict[int, Any]) -> Any:
-        """Return the box of a group in its own space, given the corners of shapes; ``boxes`` has those already known."""
+        """Return the box of a group in its own space from the corners of shapes; ``boxes`` keeps what is known."""
         if index in boxes:
             return boxes[index]
         found: list[Any] = []
