@@ -103,6 +103,20 @@ def add_stage(parser: argparse.ArgumentParser, time: bool = True, scene_file: bo
         help="where to look for assets after the stage's own folders",
     )
     group.add_argument(
+        "--session-layer", "--sessionLayer", metavar="FILE", help="a layer stronger than all layers of the stage"
+    )
+    group.add_argument(
+        "--mask",
+        type=_names,
+        action="extend",
+        default=[],
+        metavar="PRIM[,PRIM...]",
+        help="load these prims and what they need, nothing else",
+    )
+    group.add_argument(
+        "--payloads", choices=("all", "none"), default="all", help="which payloads to load; all unless given"
+    )
+    group.add_argument(
         "--missing",
         choices=("warn", "error"),
         default="warn",
@@ -190,6 +204,9 @@ def stage_options(args: argparse.Namespace) -> dict[str, Any]:
         "variants": args.variant,
         "overrides": args.overrides,
         "search_paths": args.search_path,
+        "session_layer": args.session_layer,
+        "mask": args.mask,
+        "payloads": args.payloads,
         "frame": frame(args),
     }
 
@@ -219,6 +236,9 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
                 variants=args.variant,
                 overrides=args.overrides,
                 search_paths=args.search_path,
+                session_layer=args.session_layer,
+                mask=args.mask,
+                payloads=args.payloads,
                 missing=args.missing,
                 strict=args.strict,
             )
@@ -231,6 +251,9 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
         "--variant": bool(args.variant),
         "--set": bool(args.overrides),
         "--search-path": bool(args.search_path),
+        "--session-layer": args.session_layer is not None,
+        "--mask": bool(args.mask),
+        "--payloads": args.payloads != "all",
     }
     for option, is_given in given.items():
         if is_given:

@@ -30,14 +30,14 @@ class Elements(NamedTuple):
     """Name of the float64 array of shape (n, 12): the instancer's space from the prototype root's parent's."""
     indices: str | None
     """Name of the int32 array that says which elements they are; None where they are all."""
-    count: int
+    total: int
     """Elements of the instancer."""
 
 
 class _Shown(NamedTuple):
     """What the arrays of an instancer say, but for transforms."""
 
-    count: int
+    total: int
     elements: dict[int, Array | None]
     """Per prototype in use: its elements; None for all."""
 
@@ -83,7 +83,7 @@ class InstancerReader:
         missing = [index for index in wanted if index not in arrays]
         if missing:
             self._compute(prim, shown, {index: targets[index] for index in missing}, arrays)
-        return [Elements(targets[index], *arrays[index], shown.count) for index in wanted if index in arrays]
+        return [Elements(targets[index], *arrays[index], shown.total) for index in wanted if index in arrays]
 
     def _read(self, prim: Any) -> _Shown | None:
         """Return which elements show which prototype; None with a warning where that cannot be known."""
@@ -160,7 +160,7 @@ class InstancerReader:
         value = instancer(prim).ComputeInstanceTransformsAtTime(
             self._time, self._time, instancer.ExcludeProtoXform, instancer.IgnoreMask
         )
-        if len(value) != shown.count:
+        if len(value) != shown.total:
             self._warn(prim, tokens.POSITIONS, "USD computes no transforms from its arrays; nothing is instanced")
             return
         transforms = np.asarray(value)

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import enum
 import itertools
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from .materials import MaterialReader
 from .render import find_settings, read_settings, token_list
 from .stage import (
     OpenedStage,
-    Overrides,
+    Opening,
     composition_warnings,
     open_stage,
     quiet_usd,
@@ -198,7 +197,7 @@ class _Walk:
                 "path": path,
                 "group": self._prototype(self.stage.GetPrimAtPath(elements.prototype), prim, state),
                 "transforms": elements.transforms,
-                "count": elements.count,
+                "count": elements.total,
             }
             if elements.indices is not None:
                 item["indices"] = elements.indices
@@ -420,11 +419,9 @@ def read_stage(
     render_settings: str | None,
     product: str | None,
     purposes: Sequence[str] | None,
-    variants: Sequence[str],
-    overrides: Overrides,
-    search_paths: Sequence[str | os.PathLike[str]],
     missing: str,
     strict: bool,
+    **opening: Unpack[Opening],
 ) -> Description:
     """Read a stage into a description; the arguments are those of :func:`abbe.usd.describe`."""
     if missing not in ("warn", "error"):
@@ -432,9 +429,9 @@ def read_stage(
     diagnostics = Diagnostics()
     source = source_name(stage_or_path)
     with quiet_usd(source, diagnostics):
-        opened = open_stage(
-            stage_or_path, variants=variants, overrides=overrides, search_paths=search_paths, diagnostics=diagnostics
-        )
+        # A mask keeps the camera and the settings that were asked for by path.
+        also = [path for path in (camera, render_settings, product) if path and path.startswith("/")]
+        opened = open_stage(stage_or_path, also=also, diagnostics=diagnostics, **opening)
         return _read(opened, diagnostics, frame, camera, render_settings, product, purposes, missing, strict)
 
 
