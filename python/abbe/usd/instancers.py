@@ -21,6 +21,10 @@ from .values import int_array, is_finite, matrix, place, read
 __all__ = ["Elements", "InstancerReader"]
 
 
+# Older versions of USD have `orientations` alone.
+_LACKS_ORIENTATIONS_F = not hasattr(UsdGeom.PointInstancer, "GetOrientationsfAttr")
+
+
 class Elements(NamedTuple):
     """The elements of one instancer that show one prototype."""
 
@@ -102,6 +106,8 @@ class InstancerReader:
             return None
         for name in (tokens.SCALES, tokens.ORIENTATIONS_F, tokens.ORIENTATIONS):
             self._fits(prim, name, count)
+        if _LACKS_ORIENTATIONS_F and prim.HasAttribute(tokens.ORIENTATIONS_F):
+            self._warn(prim, tokens.ORIENTATIONS_F, "is newer than this USD, which ignores it: author orientations too")
         if any(prim.GetAttribute(name) and prim.GetAttribute(name).HasAuthoredValue() for name in tokens.MOTION_NAMES):
             self.moving.append(prim)
         mask = self._mask(prim, count)
