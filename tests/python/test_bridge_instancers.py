@@ -12,6 +12,7 @@ pytest.importorskip("pxr.Usd", reason="the bridge needs usd-core")
 
 from pxr import Sdf, Usd, UsdGeom, Vt
 
+import abbe
 from abbe.errors import StageError
 from abbe.usd import describe, instancers, reader
 
@@ -194,6 +195,47 @@ def test_the_box_that_is_framed_holds_everything_that_is_instanced():
     (camera,) = checked(in_memory(row)).document["cameras"]
     assert camera["transform"][12:14] == [1, 0]
     assert camera["focus_distance"] == pytest.approx(np.hypot(2, 1) / aperture + 1)
+
+
+def test_identifiers_of_a_render_name_the_instance_that_is_seen(tmp_path):
+    options = {"frame": 3, "mask": ["/World/Forest"]}
+    description = checked(STAGE, **options)
+    places = {(path, instance or ""): world for path, instance, world, _ in unrolled(description)}
+    radii = {
+        shape["sphere"]["path"]: shape["sphere"]["radius"]
+        for shape in description.document["shapes"]
+        if "sphere" in shape
+    }
+    aovs = ["position", "prim_id", "instance_id"]
+    scene = abbe.Scene.from_stage(STAGE, **options)
+    film = scene.render(width=400, aovs=aovs)
+    prims, instances = (abbe.Manifest(film.metadata[f"abbe:{what}Manifest"]) for what in ("prim", "instance"))
+    assert len(instances.entries) < 5 < len(instances)
+    seen = set()
+    for position, prim, instance in zip(*(film[name].reshape(-1, film[name].shape[-1]) for name in aovs), strict=True):
+        path = prims[int(prim[0]) - 1] if prim[0] else None
+        if path in radii:
+            key = path, instances[int(instance[0]) - 1] if instance[0] else ""
+            point = np.append(position, 1.0) @ np.linalg.inv(places[key])
+            # Positions are float32, some 100 units from the origin, and the smallest scale is 1/20 of a unit.
+            assert np.linalg.norm(point[:3]) == pytest.approx(radii[path], abs=1e-3), key
+            seen.add(key)
+    assert len(seen) >= 15, "many instances are seen"
+    scene.save(tmp_path / "scene.safetensors")
+    for mapped in (False, True):
+        loaded = abbe.Scene.load(tmp_path / "scene.safetensors", mapped=mapped).render(width=400, aovs=aovs)
+        assert all(np.array_equal(loaded[name], film[name]) for name in aovs)
+        assert loaded.metadata["abbe:instanceManifest"] == film.metadata["abbe:instanceManifest"]
+
+
+def test_transforms_reach_the_core_without_being_copied():
+    description = checked(STAGE)
+    names = {item["transforms"] for group in description.document["groups"] for item in group.get("instances", [])}
+    for name in names:
+        array = description.arrays[name]
+        while array is not None and isinstance(array, np.ndarray):
+            assert not array.flags.writeable, "what could change would be copied"
+            array = array.base
 
 
 # What does not fit
