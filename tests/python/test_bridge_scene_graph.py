@@ -223,3 +223,28 @@ def test_the_callers_resolver_context_finds_assets(tmp_path):
     # Composed anew for what is overridden, in the same context.
     radius = checked(stage, overrides=["/A.radius=3"]).document["shapes"][0]["sphere"]["radius"]
     assert radius == 3.0
+
+
+# The command line
+
+
+def test_the_command_line_opens_stages_the_same_way(run, library, tmp_path):
+    session = tmp_path / "session.usda"
+    session.write_text('#usda 1.0\nover "World"\n{\n def Camera "Added"\n {\n }\n}\n')
+    result = run("list-cameras", library, "--sessionLayer", session)
+    assert result.returncode == 0 and {line.split()[0] for line in result.stdout.splitlines()} == {
+        "/World/Shot",
+        "/World/Added",
+    }
+    result = run("list-cameras", library, "--session-layer", session, "--mask", "/World/Own,/World/Added")
+    assert [line.split()[0] for line in result.stdout.splitlines()] == ["/World/Added"]
+    result = run(
+        "plan", library, "--payloads", "none", "--mask", "/World/L", "--aov", "depth", "--camera", "/World/Shot"
+    )
+    assert result.returncode == 0 and "payload not loaded: 1 left out by the bridge" in result.stdout
+    result = run("plan", library, "--mask", "/World/Nope")
+    assert result.returncode == 1 and "</World/Nope>: there is no such prim" in result.stderr
+    assert run("export", library, "scene.safetensors", "--quiet").returncode == 0
+    for option in (["--mask", "/World"], ["--payloads", "none"], ["--session-layer", str(session)]):
+        result = run("plan", "scene.safetensors", *option)
+        assert result.returncode == 2 and result.stderr.startswith(f"abbe: {option[0]}: "), result.stderr
