@@ -13,9 +13,6 @@ use super::tree::{Bounds, Tree};
 use super::{Departures, Hit, Instance, InstanceArray, Location, Numbering, Ray, Shape};
 use crate::ray::LocalSurface;
 
-/// Above this number of members [`Aggregate::touching`] would take longer than what it saves.
-const MANY: usize = 4096;
-
 /// Everything that rays can meet.
 #[derive(Debug)]
 pub struct Aggregate {
@@ -180,31 +177,22 @@ impl Aggregate {
         Some([all.min, all.max])
     }
 
-    /// For each instance that `is_member`, whether its bounds meet those of another member: only then can their surfaces
-    /// coincide. More than 4096 members are not compared, and count as touching.
-    pub fn touching(&self, is_member: impl Fn(u32) -> bool) -> Vec<bool> {
-        let mut touching: Vec<bool> = (0..self.numbering.len()).map(is_member).collect();
-        if touching.iter().filter(|&&member| member).count() > MANY {
-            return touching;
-        }
-        let members: Vec<(usize, Bounds)> = (0..self.numbering.len())
-            .filter(|&i| std::mem::take(&mut touching[i as usize]))
-            .filter_map(|i| Some((i as usize, self.bounds_of(i)?)))
-            .collect();
+    /// Whether the bounds of an instance meet those of another one that `is_member`: only then can their surfaces coincide.
+    pub fn is_touching(&self, instance: u32, is_member: impl Fn(u32) -> bool) -> bool {
+        let Some(bounds) = self.bounds_of(instance) else { return false };
         // Surfaces that coincide under different transforms differ by rounding of their coordinates.
-        let meet = |a: &Bounds, b: &Bounds| {
-            let reach = a.min.abs().max(a.max.abs()).max(b.min.abs()).max(b.max.abs());
-            let margin = reach.max_element() * self.spread * 2f64.powi(-46);
-            a.min.cmple(b.max + margin).all() && b.min.cmple(a.max + margin).all()
-        };
-        for (k, (i, a)) in members.iter().enumerate() {
-            for (j, b) in &members[k + 1..] {
-                if !(touching[*i] && touching[*j]) && meet(a, b) {
-                    (touching[*i], touching[*j]) = (true, true);
-                }
-            }
-        }
-        touching
+        let margin = |reach: f64| reach * self.spread * 2f64.powi(-46);
+        let widest = margin(self.tree.reach());
+        let search = Bounds { min: bounds.min - widest, max: bounds.max + widest };
+        self.tree.any_meeting(&search, |i| {
+            let other = self.instance(i);
+            other != instance
+                && is_member(other)
+                && self.bounds_of(other).is_some_and(|other| {
+                    let margin = margin(bounds.reach().max(other.reach()));
+                    bounds.min.cmple(other.max + margin).all() && other.min.cmple(bounds.max + margin).all()
+                })
+        })
     }
 
     /// What `intersect` finds by asking every primitive: the law that trees are tested against.

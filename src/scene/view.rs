@@ -1,5 +1,7 @@
 //! The scene as one camera sees it: instances about the camera, media at one wavelength, the media it stands in.
 
+use std::sync::atomic::{AtomicU8, Ordering};
+
 use glam::DVec3;
 
 use super::Scene;
@@ -13,6 +15,11 @@ use crate::spectrum::Wavelength;
 /// The direction of the one fixed ray that finds the media around the camera: no axis or diagonal that scenes are built on.
 const PARITY_DIRECTION: DVec3 = DVec3::new(0.267_261_241_912_424_4, 0.534_522_483_824_848_8, 0.801_783_725_737_273_2);
 
+// What is known of an object.
+const UNKNOWN: u8 = 0;
+const ALONE: u8 = 1;
+const TOUCHING: u8 = 2;
+
 /// A scene in render space: the stage's world with the camera at the origin.
 #[derive(Debug)]
 pub struct View<'a> {
@@ -22,8 +29,8 @@ pub struct View<'a> {
     pub aggregate: Aggregate,
     /// World position of the origin.
     pub origin: DVec3,
-    /// Per object: whether its glass can coincide with that of another.
-    touching: Vec<bool>,
+    /// Per object: whether its glass can coincide with that of another, found out when a ray asks for it.
+    touching: Vec<AtomicU8>,
 }
 
 impl<'a> View<'a> {
@@ -31,16 +38,25 @@ impl<'a> View<'a> {
     pub fn new(scene: &'a Scene, origin: DVec3) -> Self {
         let (singles, arrays) = scene.objects.instances();
         let aggregate = Aggregate::with_arrays(&singles, arrays, origin);
-        let touching = aggregate.touching(|object| {
-            let ids = scene.objects.ids(object).material_ids;
-            ids.iter().any(|id| id.checked_sub(1).is_some_and(|i| scene.materials[i as usize].has_interior()))
-        });
+        let touching = (0..scene.objects.len()).map(|_| AtomicU8::new(UNKNOWN)).collect();
         Self { scene, aggregate, origin, touching }
     }
 
     /// Whether the surface at `hit` can coincide with another object's glass (cemented lenses, liquid in its glass).
     pub fn is_touching(&self, hit: &Hit) -> bool {
-        self.touching[hit.instance as usize]
+        let known = &self.touching[hit.instance as usize];
+        match known.load(Ordering::Relaxed) {
+            UNKNOWN => {
+                // Whoever finds out first, the answer is the same.
+                let has_interior =
+                    |id: &u32| id.checked_sub(1).is_some_and(|i| self.scene.materials[i as usize].has_interior());
+                let is_glass = |object| self.scene.objects.ids(object).material_ids.iter().any(has_interior);
+                let is_touching = is_glass(hit.instance) && self.aggregate.is_touching(hit.instance, is_glass);
+                known.store(if is_touching { TOUCHING } else { ALONE }, Ordering::Relaxed);
+                is_touching
+            }
+            answer => answer == TOUCHING,
+        }
     }
 
     /// `material_id` at `hit`, 0 for none.
