@@ -16,6 +16,8 @@ use crate::optics::media::Priority;
 
 use super::values::Values;
 
+pub(super) use absorption::StatedAbsorption;
+
 const GLASS: &str = "abbe:glass";
 const LAW: &str = "abbe:dispersion:law";
 const ND: &str = "abbe:dispersion:nd";
