@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::super::{Context, Kind, Material, ScalarIor, compile};
 use super::absorption::StatedAbsorption;
 use super::*;
+use crate::optics::Extinction;
 use crate::optics::dispersion::OutOfRange;
 use crate::scene::description;
 use crate::spectrum::{Wavelength, lines};
@@ -146,7 +147,10 @@ fn every_clear_material_of_the_catalogue_can_be_authored_by_its_name() {
     for entry in catalog::entries().filter(|entry| !entry.is_metal()) {
         let material = json!({GLASS: token(entry.name())});
         let (law, _) = dispersion(&material);
-        assert!((law.at(lines::D).ior - entry.nd()).abs() < 1e-8, "{}", entry.name());
+        assert_eq!(law, entry.dispersion(OutOfRange::Clamp).expect("is a law"), "{}", entry.name());
+        if let Some(StatedAbsorption::Extinction { entries, .. }) = absorption(&material) {
+            Extinction::table(&entries).unwrap_or_else(|problem| panic!("{}: {problem}", entry.name()));
+        }
         count += 1;
     }
     assert!(count > 500, "{count} entries");
