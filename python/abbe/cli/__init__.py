@@ -28,6 +28,7 @@ from . import (
     check,
     doctor,
     export,
+    glass,
     list_cameras,
     merge,
     messages,
@@ -42,7 +43,7 @@ __all__ = ["main"]
 
 FAILED, USAGE, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 
-_COMMANDS = (render, plan, export, aovs, list_cameras, settings, trace, check, merge, bench, doctor, plugin_path)
+_COMMANDS = (render, plan, export, aovs, glass, list_cameras, settings, trace, check, merge, bench, doctor, plugin_path)
 
 
 class _Parser(argparse.ArgumentParser):
