@@ -68,12 +68,20 @@ FULL_PURPOSE: Final = "full"
 OUTPUTS_PREFIX: Final = "outputs:"
 INPUTS: Final = "inputs"
 INPUTS_PREFIX: Final = "inputs:"
-# The surface terminals in the order they are looked for; those of other render contexts come after.
-SURFACE_OUTPUTS: Final = ("outputs:abbe:surface", "outputs:mtlx:surface", "outputs:surface")
 INFO: Final = "info"
+INFO_ID: Final = "info:id"
+SURFACE_OUTPUT: Final = "outputs:surface"
+MATERIALX_SURFACE_OUTPUT: Final = "outputs:mtlx:surface"
+# The surface terminals in the order they are looked for; those of other render contexts come after.
+SURFACE_OUTPUTS: Final = ("outputs:abbe:surface", MATERIALX_SURFACE_OUTPUT, SURFACE_OUTPUT)
 SOURCE_ASSET: Final = "sourceAsset"
 SUB_IDENTIFIER: Final = "subIdentifier"
 MATERIALX_NODE_PREFIX: Final = "ND_"
+# What UsdMtlx makes of a MaterialX document.
+MATERIALX_EXTENSION: Final = "mtlx"
+MATERIALX_ROOT: Final = "/MaterialX"
+NODE_GRAPHS: Final = "NodeGraphs"
+MATERIALX_VERSION: Final = "config:mtlx:version"
 # Nodes that read a primvar: the input that names it, and the one that has the value where there is none.
 PRIMVAR_NODES: Final = {
     "UsdPrimvarReader_": ("varname", "fallback"),

@@ -5,7 +5,8 @@ use super::range::IorRange;
 use super::series::{Quantity, Series};
 use super::table::Table;
 use super::term::Term;
-use super::valid::ValidRange;
+use super::valid::{OutOfRange, ValidRange};
+use crate::spectrum::lines;
 
 /// More terms than any law in print; a limit on what a hostile file can make us compute.
 const MOST_TERMS: usize = 64;
@@ -14,8 +15,9 @@ const MOST_TERMS: usize = 64;
 /// does that.
 ///
 /// λ is in µm in every formula, as catalogues print their coefficients.
+// Boxed: laws differ much in size, and are looked at a few times a render.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Law(Form);
+pub struct Law(Box<Form>);
 
 #[derive(Clone, Debug, PartialEq)]
 enum Form {
@@ -29,7 +31,7 @@ impl Law {
     /// An index that does not depend on wavelength.
     pub fn constant(ior: f64) -> Result<Self, String> {
         finite("the index", &[ior])?;
-        Ok(Self(Form::Constant(ior)))
+        Ok(Self(Box::new(Form::Constant(ior))))
     }
 
     /// Cauchy's law n = A + B λ⁻² + C λ⁻⁴ + …; `coefficients` are A, B in µm², C in µm⁴ …
@@ -74,7 +76,7 @@ impl Law {
                  index"
             ));
         }
-        Ok(Self(Form::AbbeNumber(AbbeNumber::new(nd, vd))))
+        Ok(Self(Box::new(Form::AbbeNumber(AbbeNumber::new(nd, vd)))))
     }
 
     /// Schott's polynomial n² = a₀ + a₁ λ² + a₂ λ⁻² + a₃ λ⁻⁴ + a₄ λ⁻⁶ + a₅ λ⁻⁸, the form of glass catalogues before
@@ -102,16 +104,16 @@ impl Law {
     /// A table of (wavelength in nm, n), wavelengths strictly increasing, two entries at least: a cubic spline ("not a
     /// knot", C²), through three entries the parabola, through two the line.
     pub fn table(entries: &[[f64; 2]]) -> Result<Self, String> {
-        Ok(Self(Form::Table(Table::new(entries)?)))
+        Ok(Self(Box::new(Form::Table(Table::new(entries)?))))
     }
 
     pub(super) fn series(name: &'static str, quantity: Quantity, constant: f64, terms: Vec<Term>) -> Self {
-        Self(Form::Series(Series::new(name, quantity, constant, terms)))
+        Self(Box::new(Form::Series(Series::new(name, quantity, constant, terms))))
     }
 
     /// n, n', n'' with λ in µm.
     pub(super) fn at(&self, micrometers: f64) -> [f64; 3] {
-        match &self.0 {
+        match &*self.0 {
             Form::Constant(ior) => [*ior, 0.0, 0.0],
             Form::AbbeNumber(law) => law.at(micrometers),
             Form::Series(law) => law.at(micrometers),
@@ -121,7 +123,7 @@ impl Law {
 
     /// Proves that no pole lies within `band` (µm) and that the index stays in `range` there.
     pub(super) fn check(&self, range: &IorRange, band: [f64; 2]) -> Result<(), String> {
-        match &self.0 {
+        match &*self.0 {
             Form::Constant(ior) => range.check_value(*ior),
             Form::AbbeNumber(law) => law.check(range, band),
             Form::Series(law) => law.check(range, band),
@@ -130,7 +132,7 @@ impl Law {
     }
 
     pub(super) fn is_constant(&self) -> bool {
-        match &self.0 {
+        match &*self.0 {
             Form::Constant(_) => true,
             Form::AbbeNumber(law) => law.is_constant(),
             Form::Series(law) => law.is_constant(),
@@ -140,21 +142,42 @@ impl Law {
 
     /// The wavelengths beyond which the law itself knows nothing: a table's ends.
     pub(super) fn own_range(&self) -> Option<ValidRange> {
-        match &self.0 {
+        match &*self.0 {
             Form::Table(law) => Some(law.range()),
             _ => None,
         }
     }
 
+    /// Whether `range` can be this law's valid range: two wavelengths in nm, within a table, and, unless the law is
+    /// extrapolated, about the d line.
+    pub fn check_range(&self, range: ValidRange, out_of_range: OutOfRange) -> Result<(), String> {
+        range.check()?;
+        if let Some(own) = self.own_range()
+            && (range.from < own.from || range.to > own.to)
+        {
+            return Err(format!(
+                "the valid range {range} goes beyond the table, which knows {own}: author a range inside, or none"
+            ));
+        }
+        if out_of_range != OutOfRange::Extrapolate && !range.contains(lines::D) {
+            return Err(format!(
+                "the law is valid from {range} only, without the d line ({}), at which n_d is stated: take a law for visible \
+                 light, or extrapolate it",
+                lines::D
+            ));
+        }
+        Ok(())
+    }
+
     pub(super) fn curvature_doubt(&self) -> Option<f64> {
-        match &self.0 {
+        match &*self.0 {
             Form::Table(law) => law.curvature_doubt(),
             _ => None,
         }
     }
 
     pub(super) fn describe(&self) -> String {
-        match &self.0 {
+        match &*self.0 {
             Form::Constant(ior) => format!("constant, n = {ior}"),
             Form::AbbeNumber(law) => law.describe(),
             Form::Series(law) => law.describe(),
