@@ -200,6 +200,12 @@ fn dispersion(
     let glass = surface.glass(diagnostics)?;
     let at_ior = |problem: String| Error::scene(&glass.ior_place, problem);
     let (law, source) = if let Some(stated) = authored.law(glass.ior, diagnostics)? {
+        if let Some(metal) = stated.glass.filter(|entry| entry.is_metal()) {
+            return Err(Error::scene(
+                stated.source,
+                format!("{} is a metal, and light passes this surface: name a glass, or author a metal", metal.name()),
+            ));
+        }
         (stated.dispersion, stated.source)
     } else if let Some(abbe_number) = glass.abbe_number {
         let law = Dispersion::from_abbe_number(glass.ior, abbe_number).map_err(at_ior)?;

@@ -348,7 +348,6 @@ fn wrong_numbers_are_refused_where_they_stand() {
             json!({"abbe:dispersion:sellmeier:b": doubles(&[1.0]), "abbe:dispersion:sellmeier:c": doubles(&[0.3])}),
             "</M>.abbe:dispersion:sellmeier:b: ",
         ),
-        (json!({"abbe:glass": {"type": "string", "value": "SCHOTT:N-BK7"}}), "</M>.abbe:glass: is \"SCHOTT:N-BK7\""),
         (
             json!({"abbe:dispersion:cauchy": doubles(&[1.5]), "abbe:dispersion:validRange": {"type": "double2", "value": [600.0, 700.0]}}),
             "</M>.abbe:dispersion:validRange: ",
