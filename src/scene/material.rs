@@ -4,6 +4,7 @@
 //! each by its own specification (`dialect`); a scalar index, constant unless [`ScalarIor`] says otherwise. Fallbacks
 //! of a schema never decide, only authored values do, and what decided stands in [`Material::chosen`].
 
+mod absorption;
 mod dialect;
 mod law;
 #[cfg(test)]
@@ -12,11 +13,12 @@ mod values;
 
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
+use crate::optics::Absorption;
 use crate::optics::dispersion::Dispersion;
 use crate::optics::media::Priority;
 use crate::scene::description::{self, Shader};
 
-use dialect::{Attenuation, Response, Surface};
+use dialect::{Response, Surface};
 use law::Authored;
 use values::Values;
 
@@ -84,6 +86,8 @@ pub enum Kind {
     Dielectric {
         /// The index inside.
         dispersion: Dispersion,
+        /// What the inside takes from the light; `None` where it is clear, and of a wall without an inside.
+        absorption: Option<Absorption>,
         /// Which medium wins where objects overlap.
         priority: Priority,
         /// Rougher than [`SMOOTH_ROUGHNESS`].
@@ -135,18 +139,20 @@ fn classify(
                 dispersion(&surface, surface.shader(), &authored, context.scalar_ior, diagnostics)?;
             let wall = if thin_walled { "thin-walled dielectric, followed straight through" } else { "dielectric" };
             let lobe = if rough { ", rough" } else { "" };
-            let absorption = match surface.attenuation(context, diagnostics)? {
-                Some(Attenuation { color: [r, g, b], distance, place }) if !thin_walled => {
-                    format!("; absorbs to ({r}, {g}, {b}) over {distance} by {place}")
-                }
-                _ => String::new(),
-            };
+            let (absorption, fades) =
+                match absorption::absorption(&surface, &authored, thin_walled, context, diagnostics)? {
+                    Some((absorption, place)) => {
+                        let fades = format!("; {} from {place}", absorption.describe());
+                        (Some(absorption), fades)
+                    }
+                    None => (None, String::new()),
+                };
             let (priority, rank) = match authored.priority()?.or(surface.priority()?) {
                 Some((priority, source)) => (priority, format!("; priority {source}")),
                 None => (Priority::UNSET, String::new()),
             };
-            let chosen = format!("{wall} ({why}{lobe}): {source}{absorption}{rank}");
-            (Kind::Dielectric { dispersion, priority, rough, thin_walled }, chosen)
+            let chosen = format!("{wall} ({why}{lobe}): {source}{fades}{rank}");
+            (Kind::Dielectric { dispersion, absorption, priority, rough, thin_walled }, chosen)
         }
         Response::Metal { why, rough: false } => (Kind::Mirror, format!("mirror: {why}, smooth")),
         Response::Metal { why, rough: true } => {
@@ -194,6 +200,12 @@ fn dispersion(
     let glass = surface.glass(diagnostics)?;
     let at_ior = |problem: String| Error::scene(&glass.ior_place, problem);
     let (law, source) = if let Some(stated) = authored.law(glass.ior, diagnostics)? {
+        if let Some(metal) = stated.glass.filter(|entry| entry.is_metal()) {
+            return Err(Error::scene(
+                stated.source,
+                format!("{} is a metal, and light passes this surface: name a glass, or author a metal", metal.name()),
+            ));
+        }
         (stated.dispersion, stated.source)
     } else if let Some(abbe_number) = glass.abbe_number {
         let law = Dispersion::from_abbe_number(glass.ior, abbe_number).map_err(at_ior)?;

@@ -5,7 +5,8 @@ use super::range::IorRange;
 use super::series::{Quantity, Series};
 use super::table::Table;
 use super::term::Term;
-use super::valid::ValidRange;
+use super::valid::{OutOfRange, ValidRange};
+use crate::spectrum::lines;
 
 /// More terms than any law in print; a limit on what a hostile file can make us compute.
 const MOST_TERMS: usize = 64;
@@ -145,6 +146,27 @@ impl Law {
             Form::Table(law) => Some(law.range()),
             _ => None,
         }
+    }
+
+    /// Whether `range` can be this law's valid range: two wavelengths in nm, within a table, and, unless the law is
+    /// extrapolated, about the d line.
+    pub fn check_range(&self, range: ValidRange, out_of_range: OutOfRange) -> Result<(), String> {
+        range.check()?;
+        if let Some(own) = self.own_range()
+            && (range.from < own.from || range.to > own.to)
+        {
+            return Err(format!(
+                "the valid range {range} goes beyond the table, which knows {own}: author a range inside, or none"
+            ));
+        }
+        if out_of_range != OutOfRange::Extrapolate && !range.contains(lines::D) {
+            return Err(format!(
+                "the law is valid from {range} only, without the d line ({}), at which n_d is stated: take a law for visible \
+                 light, or extrapolate it",
+                lines::D
+            ));
+        }
+        Ok(())
     }
 
     pub(super) fn curvature_doubt(&self) -> Option<f64> {

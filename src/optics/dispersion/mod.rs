@@ -29,6 +29,7 @@ mod term;
 mod valid;
 
 pub use law::Law;
+pub use table::check_wavelengths;
 pub use valid::{OutOfRange, ValidRange};
 
 use law::finite;
@@ -54,26 +55,9 @@ impl Dispersion {
     /// Refused are a pole and an index outside of 0.01–100 anywhere in 360–830 nm, as far as the law is used there: unless
     /// it is extrapolated, within `valid` only, which then has to hold the d line.
     pub fn new(law: Law, valid: Option<ValidRange>, out_of_range: OutOfRange) -> Result<Self, String> {
-        if let Some(range) = valid {
-            range.check()?;
-            if let Some(own) = law.own_range()
-                && (range.from < own.from || range.to > own.to)
-            {
-                return Err(format!(
-                    "the valid range {range} goes beyond the table, which knows {own}: author a range inside, or none"
-                ));
-            }
-        }
         let valid = valid.or(law.own_range());
-        if let Some(range) = valid
-            && out_of_range != OutOfRange::Extrapolate
-            && !range.contains(lines::D)
-        {
-            return Err(format!(
-                "the law is valid from {range} only, without the d line ({}), at which n_d is stated: take a law for visible \
-                 light, or extrapolate it",
-                lines::D
-            ));
+        if let Some(range) = valid {
+            law.check_range(range, out_of_range)?;
         }
         let mut dispersion = Self { law, valid, out_of_range, scale: 1.0, ior_d: 1.0 };
         dispersion.law.check(&IorRange::physical(), dispersion.used_band())?;

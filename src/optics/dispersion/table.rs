@@ -99,10 +99,15 @@ impl Table {
                 "n'' is uncertain by about {:.2} %, its change when every second entry is left out",
                 1e2 * doubt
             ),
-            None => "n'' is the spline's, too few entries to tell how far it holds".to_owned(),
+            None => "n'' is the curve's, too few entries to tell how far it holds".to_owned(),
+        };
+        let curve = match self.spline.knots().len() {
+            2 => "straight line",
+            3 => "parabola",
+            _ => "cubic spline",
         };
         format!(
-            "table of {} entries from {} to {}, cubic spline; {doubt}",
+            "table of {} entries from {} to {}, {curve}; {doubt}",
             self.spline.knots().len(),
             self.range.from,
             self.range.to
@@ -141,8 +146,9 @@ fn curvature_doubt(spline: &Spline, points: &[[f64; 2]]) -> Option<f64> {
     (size > 0.0).then(|| (difference / size).sqrt())
 }
 
-/// Checks the first column of a table over wavelength: finite, in nm, positive and increasing. `what` is the second one.
-pub(super) fn check_wavelengths(table: &str, what: &str, entries: &[[f64; 2]]) -> Result<(), String> {
+/// Checks the first column of any table over wavelength: finite, in nm, positive and increasing. `table` is its name in
+/// errors, `what` that of the second column.
+pub fn check_wavelengths(table: &str, what: &str, entries: &[[f64; 2]]) -> Result<(), String> {
     if let Some([wavelength, value]) = entries.iter().find(|entry| !entry.iter().all(|v| v.is_finite())) {
         return Err(format!("{table} has the entry ({wavelength}, {value}): both have to be finite numbers"));
     }

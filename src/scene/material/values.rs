@@ -94,6 +94,21 @@ impl<'a> Values<'a> {
         }
     }
 
+    /// A list declared `double2[]`, of pairs; absent where nothing or an empty list is authored.
+    pub(super) fn pairs(&self, name: &str, diagnostics: &mut Diagnostics) -> Result<Option<Vec<[f64; 2]>>> {
+        self.warn_of_single_precision(name, diagnostics);
+        let Some(authored) = self.map.get(name) else { return Ok(None) };
+        let pair = |value: &Value| match value.as_array()?.as_slice() {
+            [first, second] => Some([finite(first)?, finite(second)?]),
+            _ => None,
+        };
+        let list = authored.value.as_array().map(|parts| parts.iter().map(pair).collect::<Option<Vec<_>>>());
+        match list.flatten() {
+            Some(list) => Ok((!list.is_empty()).then_some(list)),
+            None => self.refuse(name, "author a list of pairs of finite numbers of type double2[]"),
+        }
+    }
+
     /// An integer.
     pub(super) fn int(&self, name: &str) -> Result<Option<i32>> {
         let Some(authored) = self.map.get(name) else { return Ok(None) };

@@ -20,6 +20,8 @@ mod open_pbr;
 mod preview_surface;
 mod pxr_surface;
 mod standard_surface;
+#[cfg(test)]
+mod tests;
 mod vocabulary;
 mod vray_mtl;
 
@@ -87,8 +89,7 @@ pub(super) struct Surface<'a> {
 impl<'a> Surface<'a> {
     /// `None` if the shader's identifier is unknown.
     pub(super) fn of(shader: &'a Shader) -> Option<Self> {
-        let id = base_identifier(&shader.id);
-        let dialect = DIALECTS.iter().find(|dialect| dialect.ids().contains(&id))?;
+        let dialect = DIALECTS.iter().find(|dialect| dialect.ids().contains(&shader.id.as_str()))?;
         Some(Self { dialect: *dialect, inputs: Inputs::new(shader) })
     }
 
@@ -118,10 +119,4 @@ impl<'a> Surface<'a> {
     pub(super) fn priority(&self) -> Result<Option<(Priority, String)>> {
         self.dialect.priority(&self.inputs)
     }
-}
-
-/// The name of an MDL material without its module and parameter list: `::nvidia::core_definitions::thick_glass_v2(color,…)`.
-fn base_identifier(id: &str) -> &str {
-    let name = id.split_once('(').map_or(id, |(name, _)| name);
-    name.rsplit_once("::").map_or(name, |(_, name)| name)
 }
