@@ -19,7 +19,8 @@ pub(super) fn check(scene: &Scene, optics: &Optics, needs: &Needs, aovs: &[&Aov]
         return Ok(());
     }
     let uses_band = aovs.iter().any(|aov| OVER_THE_BAND.contains(&aov.name));
-    let reference = Use { what: "reference wavelength", attribute: "abbe:referenceWavelength", wavelength: optics.reference };
+    let reference =
+        Use { what: "reference wavelength", attribute: "abbe:referenceWavelength", wavelength: optics.reference };
     let band = optics.band.map(|wavelength| Use { what: "band", attribute: "abbe:band", wavelength });
     let channels = optics.channels.map(|wavelength| Use {
         what: "colour channel",

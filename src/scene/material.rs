@@ -12,11 +12,12 @@ mod values;
 
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::optics::dispersion::Dispersion;
+use crate::optics::catalog;
+use crate::optics::dispersion::{Dispersion, OutOfRange};
 use crate::optics::media::Priority;
 use crate::scene::description::{self, Shader};
 
-use dialect::{Attenuation, Response, Surface};
+use dialect::{Attenuation, Glass, Response, Surface};
 use law::Authored;
 use values::Values;
 
@@ -34,6 +35,8 @@ pub enum ScalarIor {
     /// It holds at every wavelength; its derivative is exactly 0.
     #[default]
     Constant,
+    /// It is that of the catalogue's glass, liquid or crystal whose n_d is nearest, and so is the curve.
+    NearestGlass,
 }
 
 impl ScalarIor {
@@ -41,11 +44,8 @@ impl ScalarIor {
     pub fn parse(text: &str, place: &str) -> Result<Self> {
         match text {
             "" | "constant" => Ok(Self::Constant),
-            "nearestGlass" | "nearest-glass" => Err(Error::usage(
-                place,
-                format!("'{text}' needs the glass catalogue, which is not part of this version: use constant"),
-            )),
-            _ => Err(Error::usage(place, format!("'{text}' is unknown: use constant"))),
+            "nearestGlass" | "nearest-glass" => Ok(Self::NearestGlass),
+            _ => Err(Error::usage(place, format!("'{text}' is unknown: use constant or nearestGlass"))),
         }
     }
 }
@@ -97,6 +97,19 @@ pub enum Kind {
     PassThrough,
     /// It ends.
     Opaque,
+}
+
+impl Kind {
+    /// In one or two words: dielectric, thin wall, mirror, cut out or opaque.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Dielectric { thin_walled: false, .. } => "dielectric",
+            Self::Dielectric { thin_walled: true, .. } => "thin wall",
+            Self::Mirror => "mirror",
+            Self::PassThrough => "cut out",
+            Self::Opaque => "opaque",
+        }
+    }
 }
 
 /// Compiles what was authored. Errors name the prim and attribute, and what to author instead.
@@ -198,12 +211,22 @@ fn dispersion(
     let (law, source) = if let Some(stated) = authored.law(glass.ior, diagnostics)? {
         (stated.dispersion, stated.source)
     } else if let Some(abbe_number) = glass.abbe_number {
-        let law = Dispersion::from_abbe_number(glass.ior, abbe_number).map_err(at_ior)?;
+        // An index that cannot be is the index's fault, what is left is the Abbe number's.
+        Dispersion::constant(glass.ior).map_err(at_ior)?;
+        let law = Dispersion::from_abbe_number(glass.ior, abbe_number)
+            .map_err(|problem| Error::scene(&glass.abbe_place, problem))?;
         (law, format!("{} of {}, n_d from {}", glass.abbe_source, shader.id, glass.ior_source))
     } else {
-        let ScalarIor::Constant = scalar_ior;
-        let law = Dispersion::constant(glass.ior).map_err(at_ior)?;
-        (law, format!("no dispersion is authored, {} of {}", glass.ior_source, shader.id))
+        let constant = Dispersion::constant(glass.ior).map_err(at_ior)?;
+        let authored = format!("no dispersion is authored, {} of {}", glass.ior_source, shader.id);
+        let nearest = match scalar_ior {
+            ScalarIor::Constant => None,
+            ScalarIor::NearestGlass => nearest_glass(&glass, diagnostics)?,
+        };
+        match nearest {
+            Some((law, name)) => (law, format!("{authored}: nearest is {name}")),
+            None => (constant, authored),
+        }
     };
     let scale = authored.scale(diagnostics)?;
     // 1 leaves the law as it is, bit for bit.
@@ -212,6 +235,29 @@ fn dispersion(
     }
     let scaled = law.scaled(scale).map_err(|problem| Error::scene(authored.scale_place(), problem))?;
     Ok((scaled, format!("{} from {source}, dispersion × {scale}", law.describe())))
+}
+
+/// The catalogue's curve nearest in n_d, and its name; `None`, with a warning, where no medium is near.
+fn nearest_glass(glass: &Glass, diagnostics: &mut Diagnostics) -> Result<Option<(Dispersion, String)>> {
+    /// Glasses and liquids lie closer than this to each other from 1.3 to 2; a larger distance means that the index is no
+    /// known medium's, for instance 1 for "does not refract".
+    const NEAR: f64 = 0.01;
+    let entry = catalog::nearest(glass.ior);
+    if (entry.nd() - glass.ior).abs() > NEAR {
+        diagnostics.warn(
+            "no-near-glass",
+            &glass.ior_place,
+            format!(
+                "no medium of the catalogue has an index near {} (the nearest is {}, {:.4}): it stays constant",
+                glass.ior,
+                entry.name(),
+                entry.nd()
+            ),
+        );
+        return Ok(None);
+    }
+    let law = entry.dispersion(OutOfRange::Clamp).map_err(|problem| Error::scene(&glass.ior_place, problem))?;
+    Ok(Some((law, format!("{} (n_d = {:.5})", entry.name(), entry.nd()))))
 }
 
 /// A law on a surface that lets no light pass is most likely a forgotten transmission.

@@ -363,13 +363,53 @@ fn wrong_numbers_are_refused_where_they_stand() {
 }
 
 #[test]
-fn scalar_ior_policies_that_need_the_catalogue_are_usage_errors() {
-    assert_eq!(ScalarIor::parse("constant", "--scalar-ior").expect("is known"), ScalarIor::Constant);
-    for text in ["nearestGlass", "nearest-glass", "other"] {
-        let error = ScalarIor::parse(text, "--scalar-ior").expect_err("is refused");
-        assert_eq!(error.exit_code(), 2);
-        assert!(error.to_string().starts_with("--scalar-ior: "), "{error}");
+fn scalar_ior_policies_are_constant_and_nearest_glass() {
+    for text in ["", "constant"] {
+        assert_eq!(ScalarIor::parse(text, "--scalar-ior").expect("is known"), ScalarIor::Constant);
     }
+    for text in ["nearestGlass", "nearest-glass"] {
+        assert_eq!(ScalarIor::parse(text, "--scalar-ior").expect("is known"), ScalarIor::NearestGlass);
+    }
+    let error = ScalarIor::parse("other", "--scalar-ior").expect_err("is refused");
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.to_string().starts_with("--scalar-ior: "), "{error}");
+}
+
+#[test]
+fn nearest_glass_gives_a_lone_index_the_curve_of_the_catalogue() {
+    let nearest = Context { scalar_ior: ScalarIor::NearestGlass, ..CONTEXT };
+    let with_ior = |ior: f64, abbe_number: f64| {
+        let inputs = json!({"transmission": float(1.0), "specular_IOR": float(ior), "transmission_dispersion": float(abbe_number)});
+        let mut diagnostics = Diagnostics::default();
+        let glass = compile(&shaded("ND_standard_surface_surfaceshader", inputs), &nearest, &mut diagnostics);
+        (glass.expect("compiles"), diagnostics)
+    };
+    let curve = |glass: &Material| match &glass.kind {
+        Kind::Dielectric { dispersion, .. } => dispersion.clone(),
+        kind => panic!("{kind:?}"),
+    };
+    for ior in [1.333, 1.46, 1.5168, 1.6, 1.78472, 2.0] {
+        let (glass, _) = with_ior(ior, 0.0);
+        let distance = (curve(&glass).at(lines::D).ior - ior).abs();
+        assert!(distance < 0.005, "{}", glass.chosen);
+        assert!(curve(&glass).abbe_number().is_some(), "{}", glass.chosen);
+        assert!(glass.chosen.contains("nearest is "), "{}", glass.chosen);
+    }
+    // N-SF11 and its equivalents have V_d from 25.6 to 25.8.
+    close(curve(&with_ior(1.78472, 0.0).0).abbe_number().expect("disperses"), 25.7, 0);
+    let (none, diagnostics) = with_ior(1.0, 0.0);
+    assert!(curve(&none).is_constant());
+    assert_eq!(kinds_of(&diagnostics), ["no-near-glass"]);
+    // Where dispersion is authored, or said to be none, the policy says nothing.
+    let (authored, _) = with_ior(1.5168, 30.0);
+    close(curve(&authored).abbe_number().expect("disperses"), 30.0, 9);
+    let mut constant = shaded("ND_standard_surface_surfaceshader", json!({"transmission": float(1.0)}));
+    constant.abbe.insert(
+        "abbe:dispersion:vd".to_owned(),
+        description::Authored { type_name: "double".to_owned(), value: json!(0.0) },
+    );
+    let glass = compile(&constant, &nearest, &mut Diagnostics::default()).expect("compiles");
+    assert!(curve(&glass).is_constant());
 }
 
 #[test]
