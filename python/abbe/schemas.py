@@ -1,14 +1,15 @@
 """The USD plug-in in this package: where it is, and making it known to USD.
 
-Three things are made known, each when the USD module that it concerns is imported, at once if it is already:
+Three things are made known:
 
-* the schemas, with ``pxr.Plug``: before the first stage, which reads the schemas of a process once and for all;
-* the shader ``AbbeGlass``, with the first ``Sdr.Registry()``, or at once where a stage is open: making that registry
-  reads the schemas, and must not happen before others have registered theirs;
-* the validators, with ``pxr.UsdValidation``.
+* the schemas, as soon as ``pxr.Plug`` is imported: before the first stage, since a process reads the schemas that
+  there are once and for all;
+* the shader ``AbbeGlass``, with the first ``Sdr.Registry()`` or ``UsdValidation.ValidationRegistry()``: making the
+  registry of shaders reads the schemas, and must not happen before others have registered theirs;
+* the validators, with the first ``UsdValidation.ValidationRegistry()``.
 
-So a program that does not use USD does not pay for it: ``pxr`` takes longer to import than the rest of this package.
-Reading a stage needs none of the three: the bridge reads attributes by name.
+Where a stage is open already all of it happens at once. A program that does not use USD does not pay for it: ``pxr``
+takes longer to import than all the rest. Reading a stage needs none of the three: the bridge reads attributes by name.
 """
 
 from __future__ import annotations
@@ -49,8 +50,8 @@ def register() -> None:
     actions: dict[str, Callable[[], None]] = {
         "pxr.Plug": _register_schemas,
         "pxr.Usd": _check_order,
-        "pxr.Sdr": _expect_registry,
-        "pxr.UsdValidation": _register_validators,
+        "pxr.Sdr": _expect_shaders,
+        "pxr.UsdValidation": _expect_validation,
     }
     sys.meta_path[:] = [finder for finder in sys.meta_path if not isinstance(finder, _Afterwards)]
     later = {name: action for name, action in actions.items() if name not in sys.modules}
@@ -118,22 +119,39 @@ def _check_order() -> None:
         )
 
 
-def _expect_registry() -> None:
-    """Have the shader registered with the first ``Sdr.Registry()``, or now if that cannot do harm any more."""
+def _expect_shaders() -> None:
     sdr: Any = importlib.import_module("pxr.Sdr")
-    if not _takes_definitions(sdr):
-        return
-    if _a_stage_may_be_open():
+    if _takes_definitions(sdr):
+        _at_first_use(sdr.Registry, register_shader)
+
+
+def _expect_validation() -> None:
+    from .validators import register_validators
+
+    def act() -> None:
+        register_validators()
+        # USD's validators look shaders up without Python, which would not be noticed here.
         register_shader()
+
+    validation: Any = importlib.import_module("pxr.UsdValidation")
+    _at_first_use(validation.ValidationRegistry, act)
+
+
+def _at_first_use(registry: Any, action: Callable[[], object]) -> None:
+    """Call ``action`` when Python first asks for a registry of USD, or now if that cannot do harm any more.
+
+    The class is as it was from then on.
+    """
+    if _a_stage_may_be_open():
+        action()
         return
-    registry = sdr.Registry
     original = vars(registry)["__new__"]
     if getattr(original.__func__, "__module__", None) == __name__:
         return
 
     def first(cls: Any, *arguments: Any) -> Any:
         registry.__new__ = original
-        register_shader()
+        action()
         return registry.__new__(cls, *arguments)
 
     registry.__new__ = staticmethod(first)
@@ -180,9 +198,3 @@ def register_shader() -> str:
     if not insistent(lambda: registry.GetShaderNodeByIdentifier(SHADER)):
         return f"Sdr did not take {path}"
     return ""
-
-
-def _register_validators() -> None:
-    from .validators import register_validators
-
-    register_validators()

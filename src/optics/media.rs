@@ -145,6 +145,17 @@ impl MediaStack {
         Ok(strongest(self.entries(), Some(index), None))
     }
 
+    /// Whether a surface that leaves `inside` lies within another medium that was entered later and is just as strong: the
+    /// two objects overlap, neither holds the other, and no priority says whose the overlap is. On the way back it belongs
+    /// to the other one.
+    pub fn is_undecided(&self, inside: &Inside) -> bool {
+        let Some(index) = self.find(inside) else { return false };
+        let entries = self.entries();
+        let left = &entries[index];
+        entries[index + 1..].iter().any(|e| e.priority == left.priority && e.medium != left.medium)
+            && entries.iter().all(|e| e.priority <= left.priority)
+    }
+
     fn find(&self, inside: &Inside) -> Option<usize> {
         let entries = self.entries();
         let same_object = |entry: &Inside| entry.instance == inside.instance && entry.slot == inside.slot;

@@ -197,6 +197,17 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
             ),
         );
     }
+    if counters.undecided_overlaps > 0 {
+        warnings.warn(
+            "undecided-overlap",
+            &scene.document().stage.source,
+            format!(
+                "{} times a ray left one glass inside of another of the same priority: the objects overlap, and which \
+                 medium fills the overlap depends on where the ray comes from: author abbe:dielectricPriority (lower wins)",
+                counters.undecided_overlaps
+            ),
+        );
+    }
     if non_finite_values > 0 {
         warnings.warn(
             "non-finite",

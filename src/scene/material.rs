@@ -4,6 +4,7 @@
 //! each by its own specification (`dialect`); a scalar index, constant unless [`ScalarIor`] says otherwise. Fallbacks
 //! of a schema never decide, only authored values do, and what decided stands in [`Material::chosen`].
 
+mod absorption;
 mod dialect;
 mod law;
 #[cfg(test)]
@@ -12,13 +13,13 @@ mod values;
 
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::optics::catalog;
 use crate::optics::dispersion::{Dispersion, OutOfRange};
 use crate::optics::media::Priority;
+use crate::optics::{Absorption, Extinction, catalog};
 use crate::scene::description::{self, Shader};
 
-use dialect::{Attenuation, Glass, Response, Surface};
-use law::Authored;
+use dialect::{Glass, Response, Surface};
+use law::{Authored, StatedAbsorption};
 use values::Values;
 
 /// From this weight on a surface counts as what the weight says: transmissive, metallic, present.
@@ -84,6 +85,8 @@ pub enum Kind {
     Dielectric {
         /// The index inside.
         dispersion: Dispersion,
+        /// What the inside takes from the light; `None` where it is clear, and of a wall without an inside.
+        absorption: Option<Absorption>,
         /// Which medium wins where objects overlap.
         priority: Priority,
         /// Rougher than [`SMOOTH_ROUGHNESS`].
@@ -92,11 +95,23 @@ pub enum Kind {
         thin_walled: bool,
     },
     /// It is reflected: a smooth metal.
-    Mirror,
+    Mirror {
+        /// The metal, where one is stated beyond a colour.
+        conductor: Option<Conductor>,
+    },
     /// It goes straight on, as if the surface were not there.
     PassThrough,
     /// It ends.
     Opaque,
+}
+
+/// The complex index n + ik of a metal.
+#[derive(Clone, Debug)]
+pub struct Conductor {
+    /// n(λ).
+    pub dispersion: Dispersion,
+    /// k(λ).
+    pub extinction: Extinction,
 }
 
 impl Kind {
@@ -105,7 +120,7 @@ impl Kind {
         match self {
             Self::Dielectric { thin_walled: false, .. } => "dielectric",
             Self::Dielectric { thin_walled: true, .. } => "thin wall",
-            Self::Mirror => "mirror",
+            Self::Mirror { .. } => "mirror",
             Self::PassThrough => "cut out",
             Self::Opaque => "opaque",
         }
@@ -142,35 +157,43 @@ fn classify(
         warn_of_idle_law(material, &authored, &reason, diagnostics)?;
         return Ok((Kind::Opaque, format!("opaque: {reason}")));
     };
-    let (kind, reason) = match surface.response(diagnostics)? {
+    let response = surface.response(diagnostics)?;
+    let uses_law = matches!(response, Response::Transmissive { .. } | Response::Metal { .. });
+    let (kind, reason) = match response {
         Response::Transmissive { why, rough, thin_walled } => {
             let (dispersion, source) =
                 dispersion(&surface, surface.shader(), &authored, context.scalar_ior, diagnostics)?;
             let wall = if thin_walled { "thin-walled dielectric, followed straight through" } else { "dielectric" };
             let lobe = if rough { ", rough" } else { "" };
-            let absorption = match (authored.absorption(diagnostics)?, surface.attenuation(context, diagnostics)?) {
-                _ if thin_walled => String::new(),
-                (Some(stated), _) => format!("; absorbs by {}", stated.place()),
-                (None, Some(Attenuation { color: [r, g, b], distance, place })) => {
-                    format!("; absorbs to ({r}, {g}, {b}) over {distance} by {place}")
-                }
-                _ => String::new(),
-            };
+            let (absorption, fades) =
+                match absorption::absorption(&surface, &authored, thin_walled, context, diagnostics)? {
+                    Some((absorption, place)) => {
+                        let fades = format!("; {} from {place}", absorption.describe());
+                        (Some(absorption), fades)
+                    }
+                    None => (None, String::new()),
+                };
             let (priority, rank) = match authored.priority()?.or(surface.priority()?) {
                 Some((priority, source)) => (priority, format!("; priority {source}")),
                 None => (Priority::UNSET, String::new()),
             };
-            let chosen = format!("{wall} ({why}{lobe}): {source}{absorption}{rank}");
-            (Kind::Dielectric { dispersion, priority, rough, thin_walled }, chosen)
+            let chosen = format!("{wall} ({why}{lobe}): {source}{fades}{rank}");
+            (Kind::Dielectric { dispersion, absorption, priority, rough, thin_walled }, chosen)
         }
-        Response::Metal { why, rough: false } => (Kind::Mirror, format!("mirror: {why}, smooth")),
-        Response::Metal { why, rough: true } => {
-            (Kind::Opaque, format!("opaque: {why}, rougher than {SMOOTH_ROUGHNESS}"))
+        Response::Metal { why, rough } => {
+            let (conductor, source) = match conductor(&surface, &authored, diagnostics)? {
+                Some((conductor, source)) => (Some(conductor), format!("; n + ik from {source}")),
+                None => (None, String::new()),
+            };
+            match rough {
+                false => (Kind::Mirror { conductor }, format!("mirror: {why}, smooth{source}")),
+                true => (Kind::Opaque, format!("opaque: {why}, rougher than {SMOOTH_ROUGHNESS}{source}")),
+            }
         }
         Response::CutOut(why) => (Kind::PassThrough, format!("cut out: {why}")),
         Response::Opaque(why) => (Kind::Opaque, format!("opaque: {why}")),
     };
-    if !matches!(kind, Kind::Dielectric { .. }) {
+    if !uses_law {
         warn_of_idle_law(material, &authored, &reason, diagnostics)?;
     }
     Ok((kind, format!("{reason}{}", passed_over(&terminals, surface.shader()))))
@@ -209,6 +232,12 @@ fn dispersion(
     let glass = surface.glass(diagnostics)?;
     let at_ior = |problem: String| Error::scene(&glass.ior_place, problem);
     let (law, source) = if let Some(stated) = authored.law(glass.ior, diagnostics)? {
+        if let Some(metal) = stated.glass.filter(|entry| entry.is_metal()) {
+            return Err(Error::scene(
+                stated.source,
+                format!("{} is a metal, and light passes this surface: name a glass, or author a metal", metal.name()),
+            ));
+        }
         (stated.dispersion, stated.source)
     } else if let Some(abbe_number) = glass.abbe_number {
         // An index that cannot be is the index's fault, what is left is the Abbe number's.
@@ -258,6 +287,41 @@ fn nearest_glass(glass: &Glass, diagnostics: &mut Diagnostics) -> Result<Option<
     }
     let law = entry.dispersion(OutOfRange::Clamp).map_err(|problem| Error::scene(&glass.ior_place, problem))?;
     Ok(Some((law, format!("{} (n_d = {:.5})", entry.name(), entry.nd()))))
+}
+
+/// The metal that our attributes state, and where; `None` where they say nothing of it, or half.
+fn conductor(
+    surface: &Surface<'_>,
+    authored: &Authored<'_>,
+    diagnostics: &mut Diagnostics,
+) -> Result<Option<(Conductor, String)>> {
+    let absorption = authored.absorption(diagnostics)?;
+    let law = match authored.has_law()? {
+        true => authored.law(surface.glass(diagnostics)?.ior, diagnostics)?,
+        false => None,
+    };
+    match (law, absorption) {
+        (Some(stated), Some(StatedAbsorption::Extinction { entries, place }))
+            if stated.glass.is_none_or(|entry| entry.is_metal()) =>
+        {
+            let extinction = Extinction::table(&entries).map_err(|problem| Error::scene(place, problem))?;
+            Ok(Some((Conductor { dispersion: stated.dispersion, extinction }, stated.source)))
+        }
+        (None, None) => Ok(None),
+        (law, absorption) => {
+            let place = match (&law, &absorption) {
+                (Some(stated), _) => stated.source.clone(),
+                (None, stated) => stated.as_ref().map_or_else(String::new, |stated| stated.place().to_owned()),
+            };
+            diagnostics.warn(
+                "no-metal",
+                place,
+                "is not the n + ik of a metal, which this surface is: name a metal of the catalogue, author n(λ) and \
+                 abbe:extinction:table, or make the surface transmissive",
+            );
+            Ok(None)
+        }
+    }
 }
 
 /// A law on a surface that lets no light pass is most likely a forgotten transmission.

@@ -170,13 +170,11 @@ class Reading:
                 scene = _core.Scene(*self._probe(settings=document))
                 found = [warning for _, plan in scene.plan("{}") for warning in json.loads(plan)["warnings"]]
             except AbbeError as error:
-                remarks.append(self.error(error))
+                remarks.append(self.error(error, settings))
                 continue
             for warning in (*diagnostics.warnings(), *found):
                 for remark in _warnings(warning):
-                    # The core knows the one prim that its settings come from.
-                    place = remark.place.replace("render settings, ", f"<{settings.GetPath()}>.")
-                    remarks.append(dataclasses.replace(remark, place=place))
+                    remarks.append(dataclasses.replace(remark, place=_settings_place(remark.place, settings)))
         return list(dict.fromkeys(remarks))
 
     def shape_remarks(self, shape: Mapping[str, Any], arrays: Mapping[str, Array]) -> list[Remark]:
@@ -187,14 +185,14 @@ class Reading:
             return [self.error(error)]
         return [remark for warning in scene.warnings() for remark in _warnings(warning)]
 
-    def error(self, error: AbbeError) -> Remark:
-        """Return an error's place and message."""
-        text = str(error)
+    def error(self, error: AbbeError, settings: Any = None) -> Remark:
+        """Return an error's place and message; without a place it is that of the settings, else of the stage."""
+        text = str(error) if settings is None else _settings_place(str(error), settings)
         if text.startswith(f"{self.source}: "):
             return Remark("error", "refused", self.source, text[len(self.source) + 2 :])
         place, _, message = text.partition(": ")
         if " " in place or not message:
-            place, message = self.source, text
+            place, message = self.source if settings is None else f"<{settings.GetPath()}>", text
         return Remark("error", "refused", place, message)
 
     def finding(self, validator: str, remark: Remark) -> Finding:
@@ -278,6 +276,11 @@ _CAMERA: Mapping[str, Any] = {
     "vertical_aperture": 15.2908,
     "focal_length": 50.0,
 }
+
+
+def _settings_place(text: str, settings: Any) -> str:
+    """Return a text of the core, which has one prim of settings and does not name it, with its path."""
+    return text.replace("render settings, ", f"<{settings.GetPath()}>.", 1)
 
 
 def shared_source(prim: Any) -> Any:

@@ -44,7 +44,7 @@ def render_vars(reading: Reading) -> Iterator[Finding]:
     names = {row["name"] for row in _core.aovs()} | set(_core.aov_aliases())
     for remark in reading.render_remarks:
         prim = _render_var(reading, remark)
-        if not prim:
+        if not prim or remark.kind == "unknown-attribute":
             continue
         finding = reading.finding("abbe:RenderVars", remark)
         if remark.kind == "unavailable-render-var":
@@ -60,7 +60,8 @@ def render_vars(reading: Reading) -> Iterator[Finding]:
 def render_settings(reading: Reading) -> Iterator[Finding]:
     """Tell what the core says of the settings and products."""
     for remark in reading.render_remarks:
-        if not _render_var(reading, remark):
+        # Misspelt names are the matter of another validator.
+        if remark.kind != "unknown-attribute" and not _render_var(reading, remark):
             yield reading.finding("abbe:RenderSettings", remark)
 
 

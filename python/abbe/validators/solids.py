@@ -45,9 +45,9 @@ class _Body:
 
     @cached_property
     def points(self) -> F64:
-        """Object-space points; of a sphere some on its surface, spread evenly (Fibonacci's spiral)."""
+        """Object-space points that faces use; of a sphere some on its surface, spread evenly (Fibonacci's spiral)."""
         if self.is_mesh:
-            return np.asarray(self.arrays[self.shape["mesh"]["points"]], np.float64)
+            return np.unique(self.triangles.reshape(-1, 3), axis=0)
         turns = np.arange(_SAMPLES) + 0.5
         height, azimuth = 1 - 2 * turns / _SAMPLES, turns * np.pi * (3 - 5**0.5)
         reach = np.sqrt(1 - height**2)
@@ -60,7 +60,7 @@ class _Body:
         mesh = self.shape["mesh"]
         counts = np.asarray(self.arrays[mesh["face_vertex_counts"]], np.int64)
         indices = np.asarray(self.arrays[mesh["face_vertex_indices"]], np.int64)
-        points = self.points
+        points = np.asarray(self.arrays[mesh["points"]], np.float64)
         if counts.min() < 0 or counts.sum() > len(indices) or indices.min() < 0 or indices.max() >= len(points):
             return np.empty((0, 3, 3))
         cut = np.maximum(counts - 2, 0)
@@ -108,14 +108,32 @@ class _Body:
         inverse = np.linalg.inv(self.transform)
         return np.asarray(points @ inverse[:3, :3] + inverse[3, :3], np.float64)
 
-    @cached_property
-    def samples(self) -> F64:
-        """World-space points on the surface: vertices and the middles of faces, drawn in slightly."""
-        points = self.points
-        if self.is_mesh and len(self.triangles):
-            points = np.concatenate([points, self.triangles.mean(axis=1)])
-        middle = points.mean(axis=0)
+    def drawn_in(self, points: F64) -> F64:
+        """Object-space points of the surface in the world, as if the body were slightly smaller."""
+        middle = self.points.mean(axis=0)
         return self.to_world(middle + (1 - _SHRINK) * (points - middle))
+
+    def surface_within(self, low: F64, high: F64) -> tuple[F64, bool]:
+        """Return world-space points of the surface that lie in a box, and whether all of it does.
+
+        Vertices, the middles of triangles, and of each edge the middle of the part that lies in the box.
+        """
+        points = self.drawn_in(self.points)
+        within = ((low < points) & (points < high)).all(axis=1)
+        found = [points[within]]
+        if self.is_mesh:
+            triangles = self.drawn_in(self.triangles.reshape(-1, 3)).reshape(-1, 3, 3)
+            begin, along = triangles, np.roll(triangles, -1, axis=1) - triangles
+            with np.errstate(
+                divide="ignore", invalid="ignore"
+            ):  # edges along an axis: ±inf, or nan on a face of the box
+                crossings = np.stack([(low - begin) / along, (high - begin) / along])
+            enter = np.fmax(np.nanmin(crossings, axis=0).max(axis=-1), 0.0)
+            leave = np.fmin(np.nanmax(crossings, axis=0).min(axis=-1), 1.0)
+            met = enter < leave
+            found += [begin[met] + ((enter[met] + leave[met]) / 2)[:, None] * along[met], triangles.mean(axis=1)]
+        inner = np.concatenate(found)
+        return inner[((low < inner) & (inner < high)).all(axis=1)], bool(within.all())
 
     def contains(self, world: F64) -> npt.NDArray[np.bool_]:
         """Tell which world-space points lie inside.
@@ -268,9 +286,6 @@ def _crosses(body: _Body, other: _Body) -> bool:
     """Tell whether some of a body's surface lies inside another and some outside."""
     triangles = len(other.triangles) if other.is_mesh else 1
     count = int(min(_SAMPLES, max(16, _PAIRS / max(triangles, 1))))
-    low, high = other.box
-    samples = body.samples
-    within = ((low < samples) & (samples < high)).all(axis=1)
-    near = samples[within]
+    near, is_all = body.surface_within(*other.box)
     inside = other.contains(near[:: max(1, len(near) // count)])
-    return bool(inside.any() and not (inside.all() and within.all()))
+    return bool(inside.any() and not (inside.all() and is_all))
