@@ -12,6 +12,7 @@ Documents are checked before the MaterialX library, which recurses without a lim
 from __future__ import annotations
 
 import importlib
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -170,23 +171,32 @@ class _Reader:
 
 def _content(path: str, resolved: Any, limit: int) -> bytes:
     """Return the bytes of a file on disk, or of one in a package or store that the resolver opens."""
-    too_large = DocumentError(f"{path}: is larger than {limit:,} bytes, or with what it includes: split the document")
     try:
-        if Path(path).is_file():
-            with open(path, "rb") as file:
-                data = file.read(limit + 1)
-        else:
-            asset = Ar.GetResolver().OpenAsset(resolved)
-            if asset is None:
-                raise DocumentError(f"{path}: cannot be opened: check the path")
-            if asset.GetSize() > limit:
-                raise too_large
-            data = bytes(asset.GetBuffer())
-    except (OSError, AttributeError) as error:  # an older USD opens no assets from Python
+        data = _opened(path, resolved, limit)
+    except (OSError, KeyError, zipfile.BadZipFile) as error:
         raise DocumentError(f"{path}: cannot be read ({error}): check the path") from None
-    if len(data) > limit:
-        raise too_large
+    if data is None or len(data) > limit:
+        raise DocumentError(
+            f"{path}: is larger than {limit:,} bytes, with what it is included from: split the document"
+        )
     return data
+
+
+def _opened(path: str, resolved: Any, limit: int) -> bytes | None:
+    """Return the bytes, None if they are known to be too many."""
+    if Path(path).is_file():
+        with open(path, "rb") as file:
+            return file.read(limit + 1)
+    resolver = Ar.GetResolver()
+    if not hasattr(resolver, "OpenAsset"):
+        # Python cannot open assets before USD 25; what stands in a .usdz is in a zip file.
+        package, inner = Ar.SplitPackageRelativePathOuter(path)
+        with zipfile.ZipFile(package) as archive:
+            return archive.read(inner) if archive.getinfo(inner).file_size <= limit else None
+    asset = resolver.OpenAsset(resolved)
+    if asset is None:
+        raise OSError("the resolver does not open it")
+    return bytes(asset.GetBuffer()) if asset.GetSize() <= limit else None
 
 
 @dataclass(frozen=True)
