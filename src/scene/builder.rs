@@ -10,7 +10,7 @@ use glam::{DAffine3, DMat4};
 use rayon::prelude::*;
 
 use super::description::{self, Array, Description, Document, Element, Group, Placement, Target};
-use super::material::{self, Material, ScalarIor};
+use super::material::{self, Context, Material, ScalarIor};
 use super::{Counts, Object, Scene};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
@@ -433,11 +433,23 @@ fn build_materials(
     }
     let mut materials = Vec::new();
     let mut ids = vec![0; document.materials.len()];
+    let context = Context { scalar_ior: scalar_ior(document)?, meters_per_unit: document.stage.meters_per_unit };
     for (i, authored) in document.materials.iter().enumerate() {
         if used[i] {
-            materials.push(material::compile(authored, ScalarIor::default(), diagnostics)?);
+            materials.push(material::compile(authored, &context, diagnostics)?);
             ids[i] = materials.len() as u32;
         }
     }
     Ok((materials, ids))
+}
+
+/// `abbe:scalarIor` of the render settings.
+fn scalar_ior(document: &Document) -> Result<ScalarIor> {
+    const NAME: &str = "abbe:scalarIor";
+    let Some(authored) = document.settings.abbe.get(NAME) else { return Ok(ScalarIor::default()) };
+    let place = format!("render settings, {NAME}");
+    match authored.value.as_str() {
+        Some(text) => ScalarIor::parse(text, &place),
+        None => Err(Error::usage(place, format!("is {}: use constant or nearestGlass", authored.value))),
+    }
 }

@@ -74,13 +74,8 @@ impl Stagehand {
     }
 
     pub fn glass(&mut self, path: &str, law: ([f64; 3], [f64; 3])) -> usize {
-        self.surface(
+        self.authored_glass(
             path,
-            "ND_open_pbr_surface_surfaceshader",
-            &[
-                ("transmission_weight", authored("float", json!(1.0))),
-                ("specular_roughness", authored("float", json!(0.0))),
-            ],
             &[
                 ("abbe:dispersion:sellmeier:b", authored("double[]", json!(law.0))),
                 ("abbe:dispersion:sellmeier:c", authored("double[]", json!(law.1))),
@@ -92,6 +87,19 @@ impl Stagehand {
         let index = self.glass(path, law);
         self.document.materials[index].abbe.insert("abbe:dielectricPriority".into(), authored("int", json!(priority)));
         index
+    }
+
+    /// Clear with these attributes of ours.
+    pub fn authored_glass(&mut self, path: &str, abbe: &[(&str, Authored)]) -> usize {
+        self.surface(
+            path,
+            "ND_open_pbr_surface_surfaceshader",
+            &[
+                ("transmission_weight", authored("float", json!(1.0))),
+                ("specular_roughness", authored("float", json!(0.0))),
+            ],
+            abbe,
+        )
     }
 
     pub fn constant_glass(&mut self, path: &str, ior: f64) -> usize {

@@ -68,6 +68,10 @@ class MaterialReader:
             self.materials.append(self._read(prim, users))
         return result
 
+    def unbound(self, prim: Any) -> dict[str, Any]:
+        """Return a Material prim as the description has it, without regard to what is bound to it."""
+        return self._read(prim, [])
+
     def _index(self, prim: Any, user: Any, found: list[Any]) -> int:
         key = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         index = self._index_by_prim.get(key)

@@ -48,17 +48,33 @@ impl<'a> Values<'a> {
         let Some(authored) = self.map.get(name) else { return Ok(None) };
         let number = match &authored.value {
             Value::Array(parts) if !parts.is_empty() && parts.len() <= 4 => {
-                parts.iter().map(finite).sum::<Option<f64>>().map(|sum| sum / parts.len() as f64)
+                parts.iter().map(|part| meant(authored, part)).sum::<Option<f64>>().map(|sum| sum / parts.len() as f64)
             }
-            value => finite(value),
+            value => meant(authored, value),
         };
         number.map(Some).ok_or_else(|| self.error(name, "author a finite number"))
+    }
+
+    /// A colour, or one number for a grey; alpha is left out.
+    pub(super) fn color(&self, name: &str) -> Result<Option<[f64; 3]>> {
+        let Some(authored) = self.map.get(name) else { return Ok(None) };
+        let color = match &authored.value {
+            Value::Array(parts) => match parts[..] {
+                [ref r, ref g, ref b] | [ref r, ref g, ref b, _] => {
+                    let [r, g, b] = [r, g, b].map(|part| meant(authored, part));
+                    r.zip(g).zip(b).map(|((r, g), b)| [r, g, b])
+                }
+                _ => None,
+            },
+            value => meant(authored, value).map(|grey| [grey; 3]),
+        };
+        color.map(Some).ok_or_else(|| self.error(name, "author a colour of three finite numbers"))
     }
 
     /// A number declared `double` by the schema: single precision is accepted with a warning.
     pub(super) fn double(&self, name: &str, diagnostics: &mut Diagnostics) -> Result<Option<f64>> {
         self.warn_of_single_precision(name, diagnostics);
-        match self.map.get(name).map(|a| finite(&a.value)) {
+        match self.map.get(name).map(|a| meant(a, &a.value)) {
             None => Ok(None),
             Some(Some(number)) => Ok(Some(number)),
             Some(None) => self.refuse(name, "author a finite number of type double"),
@@ -76,6 +92,21 @@ impl<'a> Values<'a> {
         match list {
             Some(list) => Ok((!list.is_empty()).then_some(list)),
             None => self.refuse(name, "author a list of finite numbers of type double[]"),
+        }
+    }
+
+    /// A list declared `double2[]`, of pairs; absent where nothing or an empty list is authored.
+    pub(super) fn pairs(&self, name: &str, diagnostics: &mut Diagnostics) -> Result<Option<Vec<[f64; 2]>>> {
+        self.warn_of_single_precision(name, diagnostics);
+        let Some(authored) = self.map.get(name) else { return Ok(None) };
+        let pair = |value: &Value| match value.as_array()?.as_slice() {
+            [first, second] => Some([finite(first)?, finite(second)?]),
+            _ => None,
+        };
+        let list = authored.value.as_array().map(|parts| parts.iter().map(pair).collect::<Option<Vec<_>>>());
+        match list.flatten() {
+            Some(list) => Ok((!list.is_empty()).then_some(list)),
+            None => self.refuse(name, "author a list of pairs of finite numbers of type double2[]"),
         }
     }
 
@@ -129,6 +160,25 @@ impl<'a> Values<'a> {
 /// A finite number. JSON has no NaN and no infinity: bridges write them as null or as a word, neither of which is one.
 fn finite(value: &Value) -> Option<f64> {
     value.as_f64().filter(|number| number.is_finite())
+}
+
+/// A number as it was meant. USD hands 1.52 of type float over as 1.5199999809…: of the numbers that are the same float,
+/// the one with the fewest digits was written.
+fn meant(authored: &Authored, value: &Value) -> Option<f64> {
+    let number = finite(value)?;
+    let single = number as f32;
+    let is_single =
+        matches!(scalar_type(authored), "float" | "color") && f64::from(single).to_bits() == number.to_bits();
+    // The shortest text that names a float is what Display gives.
+    if is_single { single.to_string().parse().ok() } else { Some(number) }
+}
+
+/// `float` of float, float3 and float[]; `color` of the single precision colours.
+fn scalar_type(authored: &Authored) -> &str {
+    match authored.type_name.as_str() {
+        "color3f" | "color4f" => "color",
+        name => name.trim_end_matches("[]").trim_end_matches(|c: char| c.is_ascii_digit()),
+    }
 }
 
 /// A value for an error line, cut where it is long.
