@@ -18,6 +18,12 @@ pub(crate) struct PyDispersion {
     law: optics::Dispersion,
 }
 
+impl PyDispersion {
+    pub(crate) fn of(law: optics::Dispersion) -> Self {
+        Self { law }
+    }
+}
+
 fn made(by: &str, law: Result<optics::Dispersion, String>) -> Outcome<PyDispersion> {
     match law {
         Ok(law) => Ok(PyDispersion { law }),

@@ -43,6 +43,14 @@ K_TOLERANCE = 0.01
 # nm, as in src/spectrum/lines.rs.
 D, F, C = 587.5618, 486.1327, 656.2725
 
+# i, h, g, F', F, e, d, sodium's D, C', C, r, s.
+LINES = tuple(
+    map(
+        Decimal,
+        "365.0146 404.6561 435.8343 479.9914 486.1327 546.0740 587.5618 589.2938 643.8469 656.2725 706.5188 852.11".split(),
+    )
+)
+
 OPAQUE = ("metal", "semiconductor")
 
 
@@ -109,6 +117,14 @@ def plain(html: str) -> str:
 def nanometers(micrometers: str) -> str:
     """Return µm as nm, with the digits given."""
     return number(format(Decimal(micrometers).scaleb(3), "f"))
+
+
+def of_line(micrometers: str) -> str:
+    """Return nm; where a table has a line's wavelength to 0.01 nm, the line's: it is at the line that the maker measures."""
+    nm = Decimal(micrometers).scaleb(3)
+    if nm.as_tuple().exponent == -2:
+        return next((number(str(line)) for line in LINES if round(line, 2) == nm), nanometers(micrometers))
+    return nanometers(micrometers)
 
 
 def number(text: str) -> str:
@@ -192,15 +208,17 @@ def optics(document: dict, category: str) -> Optics:
             coefficients = " ".join(map(number, block["coefficients"].split()))
             found.law = f"formula {int(kind.removeprefix('formula '))} {coefficients}"
             continue
-        rows = [tuple(map(number, line.split())) for line in block["data"].splitlines() if line.strip()]
-        rows = within([(nanometers(row[0]), *row[1:]) for row in rows])
+        rows = [line.split() for line in block["data"].splitlines() if line.strip()]
+        rows = within([(of_line(row[0]), *map(number, row[1:])) for row in rows])
         if kind in ("tabulated n", "tabulated nk"):
             found.table = thinned_index(rows) if len(rows) > DENSE and category not in OPAQUE else [row[:2] for row in rows]
         if kind in ("tabulated k", "tabulated nk"):
             # Differences of measurements come out below zero where there is nothing to absorb.
             pairs = [(row[0], row[-1] if float(row[-1]) > 0 else "0") for row in rows]
             found.k = thinned_extinction(pairs) if len(rows) > DENSE and category not in OPAQUE else pairs
-    if not found.formula and found.table:
+    if found.formula and found.table:
+        raise Fault("n(λ) is given twice, by a formula and by a table")
+    if found.table:
         found.valid = (found.table[0][0], found.table[-1][0])
         found.law = "table " + " ".join(f"{nm} {n}" for nm, n in found.table)
     if all(float(k) == 0 for _, k in found.k):
@@ -281,8 +299,7 @@ def pages(catalog: list) -> Iterator[tuple[str, str, dict, str]]:
 def covered(category: str, valid: tuple[str, str]) -> bool:
     """Whether n is known where it is needed."""
     low, high = (400, 700) if category in OPAQUE else (F, C)
-    # Cadmium's and hydrogen's lines are rounded in some tables: half a nanometre.
-    return valid[0] != "" and float(valid[0]) <= low + 0.5 and float(valid[1]) >= high - 0.5
+    return valid[0] != "" and float(valid[0]) <= low and float(valid[1]) >= high
 
 
 def read(path: str) -> dict:
