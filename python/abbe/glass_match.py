@@ -265,8 +265,8 @@ def fit_sellmeier(nm: npt.ArrayLike, n: npt.ArrayLike, terms: int = 2) -> Fit:
     squared = (x / 1000.0) ** 2
 
     def strengths(log_c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        basis = squared[:, None] / (squared[:, None] - np.exp(log_c))
-        b: FloatArray = np.linalg.lstsq(basis, y * y - 1.0, rcond=None)[0]
+        basis: FloatArray = squared[:, None] / (squared[:, None] - np.exp(log_c))
+        b = np.asarray(np.linalg.lstsq(basis, y * y - 1.0, rcond=None)[0], dtype=np.float64)
         return b, basis @ b + 1.0
 
     def residual(log_c: FloatArray) -> FloatArray:
@@ -293,8 +293,8 @@ def read_points(path: str | os.PathLike[str]) -> tuple[FloatArray, FloatArray]:
 
     Parameters
     ----------
-    path : lines of nm and n, separated by a comma, semicolon, tab or blanks; a first line of names, empty lines and lines
-        after ``#`` are skipped
+    path : lines of nm and n, separated by a comma, semicolon, tab or blanks; a first line of names, empty lines and
+        what follows ``#`` are skipped
 
     Returns
     -------
