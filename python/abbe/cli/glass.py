@@ -99,9 +99,7 @@ def add(commands: Any) -> None:
     matching = actions.add_parser("match", help="find the glass, or the law, of an index", allow_abbrev=False)
     matching.add_argument("--nd", type=_positive, metavar="N", help="index at the d line")
     matching.add_argument("--vd", type=_positive, metavar="V", help="Abbe number")
-    matching.add_argument(
-        "--data", metavar="FILE.csv", help="measured indices, lines of nm,n: fits a Cauchy and a Sellmeier law"
-    )
+    matching.add_argument("--data", metavar="FILE.csv", help="measured indices, lines of nm,n: laws are fitted to them")
     matching.add_argument(
         "--terms", type=_count, metavar="N", help="of the fitted laws; what the points can determine unless given"
     )
