@@ -283,7 +283,7 @@ def document_name(text: str) -> str | None:
     """Return the identifier of the MaterialX document that a composition error is about, None if about none."""
     named = _ASSET.search(text)
     identifier = named[1].partition(_FORMAT_ARGUMENTS)[0] if named else ""
-    return identifier if identifier.lower().endswith(f".{tokens.MATERIALX_EXTENSION}") else None
+    return identifier if Ar.GetResolver().GetExtension(identifier) == tokens.MATERIALX_EXTENSION else None
 
 
 def _apply(opened: OpenedStage, variants: Sequence[str], overrides: Overrides, diagnostics: Diagnostics) -> None:
