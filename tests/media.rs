@@ -8,6 +8,7 @@ mod support;
 use abbe::camera::{Camera, ConformPolicy};
 use abbe::integrator::chain::{Chain, Counters, End, Follower, Record};
 use abbe::integrator::transmittance::{Coefficients, Segment};
+use abbe::optics::{Extinction, catalog};
 use abbe::ray::{ColumnSet, SecondOrderColumns};
 use abbe::render::trace::trace;
 use abbe::scene::Scene;
@@ -212,6 +213,37 @@ fn measured_absorption_is_physical_and_a_shaders_depth_is_in_stage_units() {
         let color = build(&|s, glass| tint(s, glass, [0.5; 3], 2.0));
         assert!((color - 0.5f64.powf(unit)).abs() < 1e-14, "{meters_per_unit}: {color}");
     }
+}
+
+#[test]
+fn what_the_catalogue_knows_of_absorption_can_be_used() {
+    let mut tables = 0;
+    for entry in catalog::entries() {
+        let Some(table) = entry.extinction() else { continue };
+        tables += 1;
+        let extinction = Extinction::table(&table).unwrap_or_else(|problem| panic!("{}: {problem}", entry.name()));
+        assert!(extinction.at(REFERENCE) >= 0.0);
+    }
+    assert!(tables > 500, "{tables} tables");
+}
+
+#[test]
+fn a_named_glass_absorbs_as_it_was_measured() {
+    // τ(10 mm) of SCHOTT's data sheet. A ball of a metre absorbs as a hundred such plates.
+    let mut s = axial();
+    let glass = s.constant_glass("/World/Glass", 1.5);
+    abbe(&mut s, glass, "glass", "string", json!("SCHOTT:N-BK7"));
+    tint(&mut s, glass, [0.1; 3], 1.0);
+    s.document.stage.meters_per_unit = 0.5;
+    s.sphere("/World/Ball", 1.0, DMat4::IDENTITY, Some(glass));
+    let scene = s.build();
+    let at = |nm: f64| follow(&scene, Wavelength::from_nanometers(nm), DVec2::ZERO).transmittance;
+    // What the sheet's three digits leave open.
+    for (nm, tau) in [(400.0, 0.997f64), (546.0, 0.999), (700.0, 0.998)] {
+        let [least, most] = [tau - 5e-4, tau + 5e-4].map(|tau| tau.powi(100));
+        assert!((least..=most).contains(&at(nm)), "{nm} nm: {}", at(nm));
+    }
+    assert!(scene.materials[0].chosen.contains("absorbs by k(λ)"), "{}", scene.materials[0].chosen);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 """Real glasses, crystals, liquids, plastics, gases and metals, on NumPy arrays.
 
-The data are those of the refractiveindex.info database (CC0 1.0), the laws the renderer's: what is computed here is what
-is rendered. Wavelengths are in nm.
+The data are those of the refractiveindex.info database (CC0 1.0), the laws the renderer's: what is computed here is
+what is rendered. Wavelengths are in nm.
 """
 
 from __future__ import annotations
@@ -61,7 +61,8 @@ class SourceLaw(NamedTuple):
 class Glass:
     """A material of the catalogue; made by :func:`glass` and :func:`glasses`.
 
-    Names come as ``SCHOTT:N-BK7`` for what a maker sells and ``diamond:Peter`` for a substance on a page of the database.
+    Names come as ``SCHOTT:N-BK7`` for what a maker sells and ``diamond:Peter`` for a substance on a page of the
+    database. Indices are as the source states them: makers' are against air, those of some papers against vacuum.
     """
 
     def __init__(self, core: _core.Glass, out_of_range: OutOfRange = "error") -> None:
@@ -152,8 +153,9 @@ class Glass:
             nm, (low, high) = np.asarray(wavelength, dtype=np.float64), self.valid_range
             outside = (nm < low) | (nm > high)
             if np.any(outside):
+                first = np.extract(outside, nm)[0]
                 raise UsageError(
-                    f"{self.name}: n(λ) is known from {low:g} to {high:g} nm, not at {np.extract(outside, nm)[0]:g} nm: "
+                    f"{self.name}: n(λ) is known from {low:g} to {high:g} nm, not at {first:g} nm: "
                     'ask inside, or take glass(…, out_of_range="clamp") or "extrapolate"'
                 )
         return wavelength
@@ -282,10 +284,10 @@ def glass(name: str, *, out_of_range: OutOfRange = "error") -> Glass:
 
     Parameters
     ----------
-    name : ``"SCHOTT:N-BK7"``, or ``"N-BK7"`` where one maker has it, ``"diamond"``, ``"diamond:Phillip"``; case, blanks,
-        hyphens and underscores do not count
-    out_of_range : what n(λ) does outside of the valid range: ``error``, ``clamp`` to its ends with zero derivatives, as a
-        render does, or ``extrapolate``
+    name : ``"SCHOTT:N-BK7"``, or ``"N-BK7"`` where one maker has it, ``"diamond"``, ``"diamond:Phillip"``; case,
+        blanks, hyphens and underscores do not count
+    out_of_range : what n(λ) does outside of the valid range: ``error``, ``clamp`` to its ends with zero derivatives, as
+        a render does, or ``extrapolate``
 
     Returns
     -------
@@ -378,7 +380,7 @@ def _matches(pattern: str, core: _core.Glass) -> bool:
 
 
 def nearest_glass(nd: float) -> Glass:
-    """Return the clear glass, crystal, plastic or liquid whose n_d is nearest, as ``abbe:scalarIor = "nearestGlass"`` does.
+    """Return the clear everyday material nearest in n_d, as ``abbe:scalarIor = "nearestGlass"`` does.
 
     Parameters
     ----------

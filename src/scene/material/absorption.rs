@@ -1,7 +1,7 @@
 //! How the inside of a glass absorbs: by what is measured of it, or by the colour that its shader gives it at a depth.
 //!
-//! First match wins: our `abbe:extinction:table` and `abbe:internalTransmittance:table`, which are physical lengths; what
-//! the shader states, whose depth is in stage units.
+//! First match wins: our `abbe:extinction:table` and `abbe:internalTransmittance:table`, and k(λ) of the glass that
+//! `abbe:glass` names, which are physical lengths; then what the shader states, whose depth is in stage units.
 
 use super::Context;
 use super::dialect::Surface;
@@ -18,18 +18,14 @@ pub(super) fn absorption(
     context: &Context,
     diagnostics: &mut Diagnostics,
 ) -> Result<Option<(Absorption, String)>> {
-    let measured = authored.absorption(diagnostics)?;
     if thin_walled {
-        if let Some(stated) = measured {
-            diagnostics.warn(
-                "idle-absorption",
-                stated.place(),
-                "a thin wall has no inside that could absorb: author a closed, thick glass",
-            );
+        if let Some(place) = authored.absorption_place() {
+            let message = "a thin wall has no inside that could absorb: author a closed, thick glass";
+            diagnostics.warn("idle-absorption", place, message);
         }
         return Ok(None);
     }
-    if let Some(stated) = measured {
+    if let Some(stated) = authored.absorption(diagnostics)? {
         return of_table(&stated, context).map(Some);
     }
     let Some(stated) = surface.attenuation(context, diagnostics)? else { return Ok(None) };

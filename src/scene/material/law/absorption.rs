@@ -29,6 +29,15 @@ impl StatedAbsorption {
 }
 
 impl Authored<'_> {
+    /// The first table of absorption that is authored, whatever stands in it.
+    pub(in super::super) fn absorption_place(&self) -> Option<String> {
+        let of = |values: &Values<'_>| {
+            let name = [EXTINCTION, TRANSMITTANCE].into_iter().find(|name| values.has(name));
+            name.map(|name| values.place(name))
+        };
+        self.places.iter().find_map(of)
+    }
+
     /// The first place that states absorption; of two tables at one place k is used, with a warning. Else k(λ) of the
     /// catalogue, if the law is that of a named material.
     pub(in super::super) fn absorption(&self, diagnostics: &mut Diagnostics) -> Result<Option<StatedAbsorption>> {
