@@ -15,6 +15,7 @@ from __future__ import annotations
 from . import schemas as _schemas
 from ._api import Plan, Progress, Scene, integrators, merge, render
 from ._core import Film, __version__
+from .catalog import Glass, glass, glasses, nearest_glass
 from .errors import AbbeError, StageError, UsageError, UsdMissingError
 from .manifest import Manifest
 from .optics import Dispersion, Reflected, Refracted, Transferred, reflect, refract, transfer
@@ -23,6 +24,7 @@ __all__ = [
     "AbbeError",
     "Dispersion",
     "Film",
+    "Glass",
     "Manifest",
     "Plan",
     "Progress",
@@ -34,8 +36,11 @@ __all__ = [
     "UsageError",
     "UsdMissingError",
     "__version__",
+    "glass",
+    "glasses",
     "integrators",
     "merge",
+    "nearest_glass",
     "reflect",
     "refract",
     "render",

@@ -145,6 +145,7 @@ class Scene:
         mask: Sequence[str] = (),
         payloads: str = "all",
         missing: str = "warn",
+        scalar_ior: str | None = None,
         strict: bool = False,
     ) -> Scene:
         """Load a USD stage.
@@ -164,6 +165,7 @@ class Scene:
         mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
         payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
         missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+        scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
         strict : a stage without a camera is an error
 
         Returns
@@ -196,6 +198,7 @@ class Scene:
             mask=mask,
             payloads=payloads,
             missing=missing,
+            scalar_ior=scalar_ior,
             strict=strict,
         )
         return cls(_core.Scene(description.to_json(), description.arrays))
@@ -413,6 +416,7 @@ def render(
     mask: Sequence[str] = (),
     payloads: str = "all",
     missing: str = "warn",
+    scalar_ior: str | None = None,
     strict: bool = False,
     progress: Callable[[Progress], object] | None = None,
 ) -> _core.Film:
@@ -439,7 +443,7 @@ def render(
     threads : all of the machine's if None
     crop : x0, y0, x1, y1 in pixels, half-open, y down
     sample_range : begin and end, half-open: a part that :func:`merge` joins with others
-    purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing : as for
+    purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, scalar_ior : as for
         :meth:`Scene.from_stage`
     strict : what would be a warning about the request, or a missing camera, is an error
     progress : called about ten times a second; ``print`` will do
@@ -475,6 +479,7 @@ def render(
         mask=mask,
         payloads=payloads,
         missing=missing,
+        scalar_ior=scalar_ior,
         strict=strict,
     )
     # The bridge has chosen camera and product already.

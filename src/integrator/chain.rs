@@ -404,7 +404,9 @@ impl<'a> Walk<'a> {
                 self.cross(met);
                 Event::Straight { is_interface: false, rough: false }
             }
-            Kind::Mirror => Event::Scattered { scattering: mirror(momentum, &met.surface, medium), rough: false },
+            Kind::Mirror { .. } => {
+                Event::Scattered { scattering: mirror(momentum, &met.surface, medium), rough: false }
+            }
             &Kind::Dielectric { thin_walled: true, rough, .. } => {
                 self.cross(met);
                 Event::Straight { is_interface: true, rough }

@@ -151,6 +151,11 @@ def add_request(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--dispersion-scale", type=float, metavar="S", help="multiplies all dispersion: 0 none, 1 physical"
     )
+    group.add_argument(
+        "--scalar-ior",
+        choices=("constant", "nearest-glass"),
+        help="what becomes of an index without dispersion; constant",
+    )
     group.add_argument("--seed", type=int, metavar="N", help="same seed, same bits")
     group.add_argument(
         "--threads", type=int, metavar="N", help="all of the machine's unless given; never changes a bit"
@@ -240,6 +245,7 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
                 mask=args.mask,
                 payloads=args.payloads,
                 missing=args.missing,
+                scalar_ior=args.scalar_ior,
                 strict=args.strict,
             )
         except NotUsdError as error:
@@ -254,6 +260,7 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
         "--session-layer": args.session_layer is not None,
         "--mask": bool(args.mask),
         "--payloads": args.payloads != "all",
+        "--scalar-ior": args.scalar_ior is not None,
     }
     for option, is_given in given.items():
         if is_given:

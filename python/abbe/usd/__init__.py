@@ -9,6 +9,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
+from . import tokens
 from .description import Description
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def describe(
     mask: Sequence[str] = (),
     payloads: str = "all",
     missing: str = "warn",
+    scalar_ior: str | None = None,
     strict: bool = False,
 ) -> Description:
     """Read a USD stage into a scene description.
@@ -51,6 +53,7 @@ def describe(
     mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
     payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
     missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+    scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
     strict : a stage without a camera is an error
 
     Returns
@@ -71,7 +74,7 @@ def describe(
     """
     from .reader import read_stage
 
-    return read_stage(
+    description = read_stage(
         stage_or_path,
         frame=frame,
         camera=camera,
@@ -87,6 +90,9 @@ def describe(
         missing=missing,
         strict=strict,
     )
+    if scalar_ior is not None:
+        description.document["settings"]["abbe"][tokens.SCALAR_IOR] = {"type": "token", "value": scalar_ior}
+    return description
 
 
 def list_cameras(

@@ -12,7 +12,9 @@ Documents are checked before the MaterialX library, which recurses without a lim
 from __future__ import annotations
 
 import importlib
+import zipfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -35,8 +37,10 @@ _MAX_BYTES = 16_000_000
 _MAX_ELEMENTS = 200_000
 # Documents nest four deep (materialx, nodegraph, node, input); graphs of nodes that are graphs somewhat deeper.
 _MAX_DEPTH = 64
-# Shaders that one node may unfold to where graphs are made of graphs; production graphs have hundreds.
-_MAX_UNFOLDED = 10_000
+# Shaders that one node may unfold to where graphs are made of graphs, production graphs having hundreds; and the prims
+# that a document may become, all its materials together.
+_MAX_UNFOLDED = 2_000
+_MAX_PRIMS = 100_000
 
 
 def read_document(identifier: str, diagnostics: Diagnostics) -> Any:
@@ -65,9 +69,12 @@ def read_document(identifier: str, diagnostics: Diagnostics) -> Any:
     try:
         _Reader(mx).read(document, identifier)
         mx.flattenFilenames(document)
+        # Before the library is there to mix with.
+        materials = document.getMaterialNodes()
         local = frozenset(definition.getName() for definition in document.getNodeDefs())
         document.setDataLibrary(_standard_library())
-        return _Translator(mx, document, local, identifier, diagnostics).layer
+        translator = _Translator(mx, document, local, identifier, diagnostics)
+        return translator.translate(materials)
     except DocumentError:
         raise
     except Exception as error:  # MaterialX' own exceptions have no common base
@@ -121,7 +128,12 @@ class _Reader:
         if Path(includer).parent.joinpath(name).exists():
             return False
         search = self._mx.getDefaultDataSearchPath()
-        return any(Path(folder.asString(), part, name).is_file() for folder in search for part in ("", "libraries"))
+        for part in (name, f"libraries/{name}"):
+            found = Path(search.find(self._mx.FilePath(part)).asString())
+            # What is not found comes back as it is.
+            if found.is_absolute() and found.is_file():
+                return True
+        return False
 
     def _checked(self, path: str, resolved: Any) -> str:
         """Return the text of a file that is well-formed, of sensible size and without a document type."""
@@ -159,31 +171,41 @@ class _Reader:
 
 def _content(path: str, resolved: Any, limit: int) -> bytes:
     """Return the bytes of a file on disk, or of one in a package or store that the resolver opens."""
-    too_large = DocumentError(f"{path}: is larger than {limit:,} bytes, or with what it includes: split the document")
     try:
-        if Path(path).is_file():
-            with open(path, "rb") as file:
-                data = file.read(limit + 1)
-        else:
-            asset = Ar.GetResolver().OpenAsset(resolved)
-            if asset is None:
-                raise DocumentError(f"{path}: cannot be opened: check the path")
-            if asset.GetSize() > limit:
-                raise too_large
-            data = bytes(asset.GetBuffer())
-    except (OSError, AttributeError) as error:  # an older USD opens no assets from Python
+        data = _opened(path, resolved, limit)
+    except (OSError, KeyError, zipfile.BadZipFile) as error:
         raise DocumentError(f"{path}: cannot be read ({error}): check the path") from None
-    if len(data) > limit:
-        raise too_large
+    if data is None or len(data) > limit:
+        raise DocumentError(
+            f"{path}: is larger than {limit:,} bytes, with what it is included from: split the document"
+        )
     return data
 
 
+def _opened(path: str, resolved: Any, limit: int) -> bytes | None:
+    """Return the bytes, None if they are known to be too many."""
+    if Path(path).is_file():
+        with open(path, "rb") as file:
+            return file.read(limit + 1)
+    resolver = Ar.GetResolver()
+    if not hasattr(resolver, "OpenAsset"):
+        # Python cannot open assets before USD 25; what stands in a .usdz is in a zip file.
+        package, inner = Ar.SplitPackageRelativePathOuter(path)
+        with zipfile.ZipFile(package) as archive:
+            return archive.read(inner) if archive.getinfo(inner).file_size <= limit else None
+    asset = resolver.OpenAsset(resolved)
+    if asset is None:
+        raise OSError("the resolver does not open it")
+    return bytes(asset.GetBuffer()) if asset.GetSize() <= limit else None
+
+
+@dataclass(frozen=True)
 class _Scope:
     """Where nodes stand that know each other by name: the document, for one material, or a graph."""
 
-    def __init__(self, element: Any, path: Any) -> None:
-        self.element = element
-        self.path = path
+    element: Any
+    path: Any
+    is_document: bool = False
 
 
 class _Translator:
@@ -198,22 +220,25 @@ class _Translator:
         self._color_space = document.getActiveColorSpace()
         # Node graphs that stand in the layer, and how many shaders each unfolds to; None while it is being written.
         self._graphs: dict[str, int | None] = {}
+        self._prims = 0
+        # Nodes of the document itself that are still to be written below a material.
+        self._waiting: list[Any] = []
         self.layer = Sdf.Layer.CreateAnonymous(f"{Path(identifier).name}.usda")
         self._root = Sdf.Path(tokens.MATERIALX_ROOT)
-        with Sdf.ChangeBlock():
-            self._translate()
 
-    def _translate(self) -> None:
-        Sdf.CreatePrimInLayer(self.layer, self._root).specifier = Sdf.SpecifierDef
-        if self._color_space:
-            self.layer.customLayerData = {"colorSpace": self._color_space}
-        materials = [m for m in self._document.getMaterialNodes() if m.getDocument() == self._document]
-        names = {material.getName() for material in materials}
-        for material in materials:
-            prim = self._material(material)
-            base = material.getInheritString()
-            if base in names:
-                prim.specializesList.prependedItems = [self._path("Materials", base)]
+    def translate(self, materials: list[Any]) -> Any:
+        """Return the layer with these materials of the document, and what they are made of."""
+        with Sdf.ChangeBlock():
+            Sdf.CreatePrimInLayer(self.layer, self._root).specifier = Sdf.SpecifierDef
+            if self._color_space:
+                self.layer.customLayerData = {"colorSpace": self._color_space}
+            names = {material.getName() for material in materials}
+            for material in materials:
+                prim = self._material(material)
+                base = material.getInheritString()
+                if base in names:
+                    prim.specializesList.prependedItems = [self._path("Materials", base)]
+        return self.layer
 
     def _warn(self, element: Any, message: str) -> None:
         self._diagnostics.warn("materialx", f"{self._identifier}: {element.getNamePath()}", message)
@@ -269,6 +294,8 @@ class _Translator:
         shaders = self._mx.getShaderNodes(material, self._mx.SURFACE_SHADER_TYPE_STRING)
         for shader in shaders[:1]:
             self._surface(shader, prim)
+        while self._waiting:
+            self._node(*self._waiting.pop())
         if not shaders and material.getInput("surfaceshader") is not None:
             self._warn(material, "its surface shader is not in the document; the material is empty")
         return prim
@@ -308,11 +335,12 @@ class _Translator:
         for declared in definition.getActiveInputs():
             public = self._input(material, declared)
             self._connect(self._input(prim, declared), public.path)
+        # Comparing elements compares all that is in them.
         parent = node.getParent()
-        if parent == self._document:
-            scope = _Scope(parent, material.path.AppendChild(tokens.NODE_GRAPHS))
-        else:
+        if parent.isA(self._mx.NodeGraph):
             scope = _Scope(parent, self._graph_in(material, parent))
+        else:
+            scope = self._outside(material)
         for item in self._fitting_inputs(node, definition):
             self._set_value(self._input(material, item), item)
             source = self._source(item, scope, material)
@@ -374,7 +402,14 @@ class _Translator:
             source = self._source(item, scope, material)
             if source is not None:
                 self._connect(attribute, source)
-        return (self._graphs.get(definition.getName()) or 1) if graph is not None else 1
+        size = (self._graphs.get(definition.getName()) or 1) if graph is not None else 1
+        self._count(size)
+        return size
+
+    def _count(self, prims: int) -> None:
+        self._prims += prims
+        if self._prims > _MAX_PRIMS:
+            raise DocumentError(f"unfolds to more than {_MAX_PRIMS} nodes for all its materials: split the document")
 
     def _custom_graph(self, definition: Any) -> Any:
         """Return the path of the graph that implements a definition of the document; None if there is none to use."""
@@ -422,16 +457,20 @@ class _Translator:
         if self.layer.GetPrimAtPath(path) is None:
             if name not in self._graphs:
                 self._write_graph(name, graph)
+            self._count(self._graphs[name] or 1)
             prim = self._refer(path, self._path(tokens.NODE_GRAPHS, name))
             # What drives the graph's own inputs stands beside it in the document.
-            outside = _Scope(self._document, material.path.AppendChild(tokens.NODE_GRAPHS))
             for item in graph.getInputs():
-                source = self._source(item, outside, material)
+                source = self._source(item, self._outside(material), material)
                 if source is not None:
                     self._connect(self._input(prim, item), source)
         return path
 
     # Connections
+
+    def _outside(self, material: Any) -> _Scope:
+        """Return the document as its nodes are written for one material."""
+        return _Scope(self._document, material.path.AppendChild(tokens.NODE_GRAPHS), True)
 
     def _source(self, port: Any, scope: _Scope, material: Any) -> Any:
         """Return the path of the property that an input or output of the document is connected to, None if none.
@@ -461,20 +500,14 @@ class _Translator:
         if node is None or not node.isA(self._mx.Node):
             self._warn(port, f"refers to the node '{node_name}', which is not there; the connection is ignored")
             return None
-        if material is not None and scope.element == self._document:
-            self._write_upstream(node, scope, material)
+        path = scope.path.AppendChild(_valid(node_name))
+        if scope.is_document and self.layer.GetPrimAtPath(path) is None:
+            self._define(path)
+            self._waiting.append((node, scope, material))
         definition = node.getNodeDef() or node.getNodeDef("", True)
         names = [item.getName() for item in definition.getActiveOutputs()] if definition is not None else []
         chosen = output or (names[0] if names else "out")
-        return scope.path.AppendChild(_valid(node_name)).AppendProperty(tokens.OUTPUTS_PREFIX + _valid(chosen))
-
-    def _write_upstream(self, node: Any, scope: _Scope, material: Any) -> None:
-        """Write a node of the document below a material, as are all it depends on, which this comes back for."""
-        path = scope.path.AppendChild(_valid(node.getName()))
-        if self.layer.GetPrimAtPath(path) is None:
-            # The prim is there before its inputs are looked at, so that a circle ends.
-            self._define(path)
-            self._node(node, scope, material)
+        return path.AppendProperty(tokens.OUTPUTS_PREFIX + _valid(chosen))
 
     # Values
 

@@ -61,26 +61,18 @@ pub fn entries() -> impl Iterator<Item = Entry> {
     lookup::records().filter_map(|record| record.entry())
 }
 
-/// The entry whose n_d is nearest to `nd`, among what is solid or liquid, clear, and not one of several pages of the same
-/// substance: what a material with an index and no more may be made of.
+/// The entry whose n_d is nearest to `nd`, among glasses of the makers and what else clear everyday objects are made of
+/// (solids and liquids): what a material with an index and no more may be.
 ///
 /// Of two that are as near, the one that its maker prefers comes first, then the one whose name does.
 pub fn nearest(nd: f64) -> Entry {
     let mut best: Option<(f64, Entry)> = None;
-    let mut usual = "";
-    for record in lookup::records() {
-        let entry = match record {
-            Record::Alias { target, .. } => {
-                usual = target;
-                continue;
-            }
-            Record::Entry(entry) => entry,
-        };
+    for entry in entries() {
         let distance = (entry.nd() - nd).abs();
         let closer = best.is_none_or(|(least, other)| {
             distance.total_cmp(&least).then_with(|| entry.preference().cmp(&other.preference())).is_lt()
         });
-        if closer && entry.is_medium_of_choice(usual) {
+        if closer && entry.is_common_medium() {
             best = Some((distance, entry));
         }
     }
