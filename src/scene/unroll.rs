@@ -16,7 +16,8 @@ use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::geometry::{Buffer, affine, is_invertible};
 
-/// More objects than this are refused: with about 150 bytes for one that an array places, these take 10 GB.
+/// More objects than this are refused. One that an array places takes about 150 bytes, and 400 while the tree is built, its
+/// transform included (`benches/instances.py`): these take 10 GB, and 27 for a while.
 const MAX_OBJECTS: u64 = 1 << 26;
 
 /// A shape placed by itself.
