@@ -497,7 +497,8 @@ def _warn_of_motion(
     instancers: list[Any], cameras: list[dict[str, Any]], settings: dict[str, Any], diagnostics: Diagnostics
 ) -> None:
     """Warn of instancers that move where a camera's shutter is open for a while and blur is not turned off."""
-    products = settings["products"] or [settings["base"]] if settings.get("base") else settings["products"]
+    base = settings.get("base")
+    products = settings["products"] or ([base] if base else [])
     is_off = bool(products) and all(product["disable_motion_blur"] for product in products)
     # A camera that frames the stage has no shutter.
     if is_off or not any(c.get("shutter_close", 0.0) > c.get("shutter_open", 0.0) for c in cameras):
