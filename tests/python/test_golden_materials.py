@@ -102,8 +102,11 @@ def test_the_golden_table_knows_glass_metal_and_paper() -> None:
     clear = ["glass", "diamond", "water", "ice", "quartz", "sapphire", "salt", "plastic_acrylic", "plastic_pc"]
     metals = ["gold", "silver", "copper", "iron", "titanium", "chromium", "nickel", "platinum", "mercury"]
     opaque = ["office_paper", "brick", "concrete", "charcoal", "chocolate", "velvet"]
-    by_name = {source.removeprefix("OpenPBR_examples/open_pbr_").removesuffix(".mtlx"): kind
-               for (source, _), kind in kinds.items() if source.startswith("OpenPBR_examples/")}
+    by_name = {
+        source.removeprefix("OpenPBR_examples/open_pbr_").removesuffix(".mtlx"): kind
+        for (source, _), kind in kinds.items()
+        if source.startswith("OpenPBR_examples/")
+    }
     assert {by_name[name] for name in clear if name in by_name} == {"dielectric"}
     assert {by_name[name] for name in metals if name in by_name} <= {"mirror", "opaque"}
     assert {by_name[name] for name in opaque if name in by_name} == {"opaque"}
