@@ -37,10 +37,10 @@ _MAX_BYTES = 16_000_000
 _MAX_ELEMENTS = 200_000
 # Documents nest four deep (materialx, nodegraph, node, input); graphs of nodes that are graphs somewhat deeper.
 _MAX_DEPTH = 64
-# Shaders that one node may unfold to where graphs are made of graphs, production graphs having hundreds; and the prims
-# that a document may become, all its materials together.
+# Shaders that one node may unfold to where graphs are made of graphs, production graphs having hundreds; and what a
+# document may become, all its materials together: nodes, and inputs of surfaces (OpenPBR has 41).
 _MAX_UNFOLDED = 2_000
-_MAX_PRIMS = 100_000
+_MAX_UNFOLDED_ALL = 200_000
 
 
 def read_document(identifier: str, diagnostics: Diagnostics) -> Any:
@@ -220,7 +220,7 @@ class _Translator:
         self._color_space = document.getActiveColorSpace()
         # Node graphs that stand in the layer, and how many shaders each unfolds to; None while it is being written.
         self._graphs: dict[str, int | None] = {}
-        self._prims = 0
+        self._unfolded = 0
         # Nodes of the document itself that are still to be written below a material.
         self._waiting: list[Any] = []
         self.layer = Sdf.Layer.CreateAnonymous(f"{Path(identifier).name}.usda")
@@ -332,6 +332,7 @@ class _Translator:
 
     def _interface(self, node: Any, definition: Any, prim: Any, material: Any) -> None:
         """Connect every input of the definition to the material, and write there, or connect, those of the node."""
+        self._count(len(definition.getActiveInputs()))
         for declared in definition.getActiveInputs():
             public = self._input(material, declared)
             self._connect(self._input(prim, declared), public.path)
@@ -406,10 +407,12 @@ class _Translator:
         self._count(size)
         return size
 
-    def _count(self, prims: int) -> None:
-        self._prims += prims
-        if self._prims > _MAX_PRIMS:
-            raise DocumentError(f"unfolds to more than {_MAX_PRIMS} nodes for all its materials: split the document")
+    def _count(self, size: int) -> None:
+        self._unfolded += size
+        if self._unfolded > _MAX_UNFOLDED_ALL:
+            raise DocumentError(
+                f"unfolds to more than {_MAX_UNFOLDED_ALL:,} nodes and inputs of surfaces: split the document"
+            )
 
     def _custom_graph(self, definition: Any) -> Any:
         """Return the path of the graph that implements a definition of the document; None if there is none to use."""
