@@ -824,3 +824,30 @@ fn three_media_that_meet_in_an_edge_share_out_the_way() {
         assert_eq!(way.counters.unmatched_exits, 0, "{shift} {slope}: {:?}", way.segments);
     }
 }
+
+#[test]
+fn glass_that_stands_on_a_table_shows_the_table() {
+    // The bottom and the table coincide exactly, in other triangles: wherever the chain ends on the table below the glass,
+    // it has taken the same events, and every ray down there ends on it.
+    for table_first in [false, true] {
+        let mut s = Stagehand::new();
+        let glass = medium(&mut s, "/World/Glass", 1.5, 0.5);
+        if table_first {
+            s.wall(0.0, 37.3, None);
+        }
+        block(&mut s, "/World/Cube", [-5.1, -5.3, 0.0], [5.2, 5.4, 1.0], glass);
+        if !table_first {
+            s.wall(0.0, 37.3, None);
+        }
+        s.camera(DVec3::new(1.0, 1.0, 6.0), DVec3::new(0.3, 0.1, 0.0));
+        let film = rendered(&s.build(), &request(31, 21, &["interfaces", "total_reflections"])).film;
+        let counts = integers(&film, "interfaces");
+        let mut kinds = counts.to_vec();
+        kinds.sort_unstable();
+        kinds.dedup();
+        println!(
+            "{table_first}: {kinds:?} {:?}",
+            kinds.iter().map(|k| counts.iter().filter(|c| *c == k).count()).collect::<Vec<_>>()
+        );
+    }
+}
