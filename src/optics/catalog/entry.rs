@@ -258,7 +258,7 @@ impl Entry {
     }
 
     /// Whether the bulk is transparent at the d line, measured by [`CLEAR_TRANSMITTANCE`].
-    fn is_clear(&self) -> bool {
+    pub(super) fn is_clear(&self) -> bool {
         let Some(table) = self.extinction() else { return true };
         let nm = lines::D.nanometers();
         let k = match table.partition_point(|[at, _]| *at < nm) {
@@ -277,10 +277,10 @@ impl Entry {
         self.page().starts_with("specs/")
     }
 
-    /// Whether an everyday object of which only the index is known may be made of it: any glass of a maker, and solids and
-    /// liquids that one meets outside of laboratories, if clear.
-    pub(super) fn is_common_medium(&self) -> bool {
-        self.cell(Cell::Common) == "common" && self.is_clear()
+    /// Whether everyday objects may be made of it: any glass of a maker, and solids and liquids that one meets outside of
+    /// laboratories.
+    pub(super) fn is_common(&self) -> bool {
+        self.cell(Cell::Common) == "common"
     }
 
     /// Orders entries of equal merit.
