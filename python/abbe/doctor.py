@@ -117,6 +117,7 @@ def examine() -> list[Finding]:
         Finding("NumPy", "ok", f"{np.__version__}, {Path(np.__file__).parent}"),
         _usd_finding(),
         *_plugin_findings(),
+        _optional("MaterialX", "MaterialX", "mtlx", "for .mtlx references", lambda mx: str(mx.getVersionString())),
         _optional("OpenImageIO", "OpenImageIO", "check", "for abbe check", lambda oiio: str(oiio.VERSION_STRING)),
         _optional("Pillow", "PIL", "preview", "for --preview", lambda pil: str(pil.__version__)),
         _optional(

@@ -235,8 +235,7 @@ _BEGINNINGS: dict[int, tuple[tuple[float, ...], ...]] = {
 def fit_sellmeier(nm: npt.ArrayLike, n: npt.ArrayLike, terms: int = 2) -> Fit:
     """Fit Sellmeier's law n² = 1 + Σ Bᵢ λ²/(λ² − Cᵢ) by nonlinear least squares (SciPy).
 
-    The resonances Cᵢ are searched for outside of the visible; the strengths Bᵢ follow linearly from them, none below 0: a
-    resonance adds to n², and terms that cancel fit the noise.
+    The resonances Cᵢ are searched for outside of the visible; the strengths Bᵢ follow linearly from them.
 
     Parameters
     ----------
@@ -260,14 +259,14 @@ def fit_sellmeier(nm: npt.ArrayLike, n: npt.ArrayLike, terms: int = 2) -> Fit:
     if 2 * terms > x.size:
         raise UsageError(f"points: {x.size} cannot determine {2 * terms} coefficients: give more points or fewer terms")
     try:
-        from scipy.optimize import least_squares, nnls
+        from scipy.optimize import least_squares
     except ImportError as error:
         raise AbbeError("match: Sellmeier fits need SciPy: pip install 'abbe[glass]'") from error
     squared = (x / 1000.0) ** 2
 
     def strengths(log_c: FloatArray) -> tuple[FloatArray, FloatArray]:
         basis: FloatArray = squared[:, None] / (squared[:, None] - np.exp(log_c))
-        b: FloatArray = nnls(basis, y * y - 1.0)[0]
+        b = np.asarray(np.linalg.lstsq(basis, y * y - 1.0, rcond=None)[0], dtype=np.float64)
         return b, basis @ b + 1.0
 
     def residual(log_c: FloatArray) -> FloatArray:

@@ -18,7 +18,8 @@ if Sdf.FileFormat.FindByExtension("mtlx"):
     pytest.skip("this USD reads MaterialX itself", allow_module_level=True)
 pytest.importorskip("MaterialX", reason="documents are read through the package that abbe[mtlx] brings")
 
-from abbe.usd.mtlx import DocumentError, read_document
+from abbe.usd.documents import DocumentError
+from abbe.usd.mtlx import read_document
 
 GLASS = """  <open_pbr_surface name="Surface" type="surfaceshader">
     <input name="specular_ior" type="float" value="1.625" />
@@ -253,6 +254,28 @@ def test_muted_layers_and_unloaded_payloads_stay_so(write):
     stage = Usd.Stage.Open(str(folder / "other.usda"))
     stage.MuteLayer(str(folder / "stage.usda"))
     assert read(stage).document["materials"] == []
+
+    folder = write(third_usda=ARCS["reference"] + BOUND % "/L/Glass")
+    stage = Usd.Stage.Open(str(folder / "third.usda"))
+    assert len(read(stage).document["materials"]) == 1
+    stage.MuteLayer(str(folder / "glass.mtlx"))
+    assert read(stage).document["materials"] == []
+
+
+@pytest.mark.parametrize("stage", ["stage.usda", "./stage.usda"])
+def test_documents_are_found_from_where_the_stage_and_the_search_paths_are(tmp_path, monkeypatch, stage):
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib" / "GLASS.MTLX").write_text(document(GLASS))
+    arc = ARCS["reference"].replace("./glass.mtlx", "GLASS.MTLX")
+    (tmp_path / "stage.usda").write_text(f"#usda 1.0\n{arc}{BOUND % '/L/Glass'}")
+    monkeypatch.chdir(tmp_path)
+    assert read(stage).document["materials"] == []
+    (material,) = read(stage, search_paths=["lib"]).document["materials"]
+    assert values(material["surface"])["specular_ior"] == 1.625
+    arc = ARCS["reference"].replace("./glass.mtlx", "./lib/GLASS.MTLX")
+    (tmp_path / "stage.usda").write_text(f"#usda 1.0\n{arc}{BOUND % '/L/Glass'}")
+    (material,) = read(stage).document["materials"]
+    assert values(material["surface"])["specular_ior"] == 1.625
 
 
 def test_a_usd_that_reads_documents_itself_is_left_alone(write, monkeypatch):

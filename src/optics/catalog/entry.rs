@@ -14,12 +14,12 @@ pub struct Entry {
     line: &'static str,
 }
 
-/// The cells of a line, as the head of `catalog.tsv` numbers them.
+/// The cells of a line, as the head of `catalog.tsv` counts them. The second one, the qualifier's key, is there to be sorted
+/// by and searched for.
 #[derive(Clone, Copy)]
 enum Cell {
-    Key,
-    Qualifier,
-    Name,
+    Key = 0,
+    Name = 2,
     Category,
     Status,
     Common,
@@ -152,11 +152,6 @@ impl Entry {
 
     pub(super) fn key(&self) -> &'static str {
         self.cell(Cell::Key)
-    }
-
-    #[cfg(test)]
-    pub(super) fn qualifier(&self) -> &'static str {
-        self.cell(Cell::Qualifier)
     }
 
     /// What kind of stuff it is.

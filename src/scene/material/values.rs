@@ -48,7 +48,8 @@ impl<'a> Values<'a> {
         let Some(authored) = self.map.get(name) else { return Ok(None) };
         let number = match &authored.value {
             Value::Array(parts) if !parts.is_empty() && parts.len() <= 4 => {
-                parts.iter().map(|part| meant(authored, part)).sum::<Option<f64>>().map(|sum| sum / parts.len() as f64)
+                let parts: Option<Vec<_>> = parts.iter().map(|part| meant(authored, part)).collect();
+                parts.map(|parts| mean(&parts))
             }
             value => meant(authored, value),
         };
@@ -160,6 +161,11 @@ impl<'a> Values<'a> {
 /// A finite number. JSON has no NaN and no infinity: bridges write them as null or as a word, neither of which is one.
 fn finite(value: &Value) -> Option<f64> {
     value.as_f64().filter(|number| number.is_finite())
+}
+
+/// The mean; of equal numbers exactly that number.
+fn mean(parts: &[f64]) -> f64 {
+    parts[0] + parts.iter().map(|part| part - parts[0]).sum::<f64>() / parts.len() as f64
 }
 
 /// A number as it was meant. USD hands 1.52 of type float over as 1.5199999809…: of the numbers that are the same float,
