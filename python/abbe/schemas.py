@@ -194,7 +194,11 @@ def register_shader() -> str:
     if insistent(lambda: registry.GetShaderNodeByIdentifier(SHADER)):
         return ""
     path = str(plugin_path() / f"{SHADER}.usda")
-    stage = usd.Stage.Open(path)
+    try:
+        stage = usd.Stage.Open(path)
+    except tf.ErrorException:
+        # Whoever asked for USD's registry must get it.
+        return f"{path} cannot be read: install abbe again"
     results = getattr(shade.ShaderDefUtils, "GetDiscoveryResults", None) or shade.ShaderDefUtils.GetNodeDiscoveryResults
     for result in results(shade.Shader(stage.GetPrimAtPath(f"/{SHADER}")), path):
         registry.AddDiscoveryResult(result)

@@ -15,10 +15,24 @@ use crate::spectrum::Wavelength;
 /// The direction of the one fixed ray that finds the media around the camera: no axis or diagonal that scenes are built on.
 const PARITY_DIRECTION: DVec3 = DVec3::new(0.267_261_241_912_424_4, 0.534_522_483_824_848_8, 0.801_783_725_737_273_2);
 
-// What is known of an object.
-const UNKNOWN: u8 = 0;
-const ALONE: u8 = 1;
-const TOUCHING: u8 = 2;
+/// Whether something is so, found out when a ray first asks. Several threads may find out at once: the answer is the same.
+#[derive(Debug, Default)]
+struct FoundOut(AtomicU8);
+
+impl FoundOut {
+    const UNKNOWN: u8 = 0;
+    const NO: u8 = 1;
+    const YES: u8 = 2;
+
+    fn or_find(&self, find: impl FnOnce() -> bool) -> bool {
+        let mut answer = self.0.load(Ordering::Relaxed);
+        if answer == Self::UNKNOWN {
+            answer = if find() { Self::YES } else { Self::NO };
+            self.0.store(answer, Ordering::Relaxed);
+        }
+        answer == Self::YES
+    }
+}
 
 /// A scene in render space: the stage's world with the camera at the origin.
 #[derive(Debug)]
@@ -29,8 +43,10 @@ pub struct View<'a> {
     pub aggregate: Aggregate,
     /// World position of the origin.
     pub origin: DVec3,
-    /// Per object: whether its glass can coincide with that of another, found out when a ray asks for it.
-    touching: Vec<AtomicU8>,
+    /// Per object: whether its glass can coincide with that of another.
+    touching: Vec<FoundOut>,
+    /// Per object: whether it can coincide with any other.
+    in_contact: Vec<FoundOut>,
 }
 
 impl<'a> View<'a> {
@@ -38,25 +54,23 @@ impl<'a> View<'a> {
     pub fn new(scene: &'a Scene, origin: DVec3) -> Self {
         let (singles, arrays) = scene.objects.instances();
         let aggregate = Aggregate::with_arrays(&singles, arrays, origin);
-        let touching = (0..scene.objects.len()).map(|_| AtomicU8::new(UNKNOWN)).collect();
-        Self { scene, aggregate, origin, touching }
+        let unknown = || (0..scene.objects.len()).map(|_| FoundOut::default()).collect();
+        Self { scene, aggregate, origin, touching: unknown(), in_contact: unknown() }
     }
 
     /// Whether the surface at `hit` can coincide with another object's glass (cemented lenses, liquid in its glass).
     pub fn is_touching(&self, hit: &Hit) -> bool {
-        let known = &self.touching[hit.instance as usize];
-        match known.load(Ordering::Relaxed) {
-            UNKNOWN => {
-                // Whoever finds out first, the answer is the same.
-                let has_interior =
-                    |id: &u32| id.checked_sub(1).is_some_and(|i| self.scene.materials[i as usize].has_interior());
-                let is_glass = |object| self.scene.objects.ids(object).material_ids.iter().any(has_interior);
-                let is_touching = is_glass(hit.instance) && self.aggregate.is_touching(hit.instance, is_glass);
-                known.store(if is_touching { TOUCHING } else { ALONE }, Ordering::Relaxed);
-                is_touching
-            }
-            answer => answer == TOUCHING,
-        }
+        self.touching[hit.instance as usize].or_find(|| {
+            let has_interior =
+                |id: &u32| id.checked_sub(1).is_some_and(|i| self.scene.materials[i as usize].has_interior());
+            let is_glass = |object| self.scene.objects.ids(object).material_ids.iter().any(has_interior);
+            is_glass(hit.instance) && self.aggregate.is_touching(hit.instance, is_glass)
+        })
+    }
+
+    /// Whether the surface at `hit` can coincide with any other object (glass on a table, the silver behind a mirror).
+    pub fn is_in_contact(&self, hit: &Hit) -> bool {
+        self.in_contact[hit.instance as usize].or_find(|| self.aggregate.is_touching(hit.instance, |_| true))
     }
 
     /// `material_id` at `hit`, 0 for none.

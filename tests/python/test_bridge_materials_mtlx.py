@@ -18,7 +18,8 @@ if Sdf.FileFormat.FindByExtension("mtlx"):
     pytest.skip("this USD reads MaterialX itself", allow_module_level=True)
 pytest.importorskip("MaterialX", reason="documents are read through the package that abbe[mtlx] brings")
 
-from abbe.usd.mtlx import DocumentError, read_document
+from abbe.usd.documents import DocumentError
+from abbe.usd.mtlx import read_document
 
 GLASS = """  <open_pbr_surface name="Surface" type="surfaceshader">
     <input name="specular_ior" type="float" value="1.625" />

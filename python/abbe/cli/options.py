@@ -11,7 +11,16 @@ from .._api import Options, Scene
 from ..errors import NotUsdError, UsageError
 from . import messages
 
-__all__ = ["add_quiet", "add_request", "add_stage", "numbers", "open_scene", "request", "stage_options"]
+__all__ = [
+    "add_quiet",
+    "add_request",
+    "add_scalar_ior",
+    "add_stage",
+    "numbers",
+    "open_scene",
+    "request",
+    "stage_options",
+]
 
 SCENE_SUFFIX = ".safetensors"
 _SCENE_FILE = f"an exported {SCENE_SUFFIX} scene"
@@ -124,6 +133,15 @@ def add_stage(parser: argparse.ArgumentParser, time: bool = True, scene_file: bo
     )
 
 
+def add_scalar_ior(group: argparse._ArgumentGroup) -> None:
+    """Add ``--scalar-ior``, which an exported scene keeps."""
+    group.add_argument(
+        "--scalar-ior",
+        choices=("constant", "nearest-glass"),
+        help="what becomes of an index without dispersion; constant",
+    )
+
+
 def add_request(parser: argparse.ArgumentParser) -> None:
     """Add what to render."""
     group = parser.add_argument_group("the image (what is not given, the stage's render settings decide)")
@@ -151,11 +169,7 @@ def add_request(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--dispersion-scale", type=float, metavar="S", help="multiplies all dispersion: 0 none, 1 physical"
     )
-    group.add_argument(
-        "--scalar-ior",
-        choices=("constant", "nearest-glass"),
-        help="what becomes of an index without dispersion; constant",
-    )
+    add_scalar_ior(group)
     group.add_argument("--seed", type=int, metavar="N", help="same seed, same bits")
     group.add_argument(
         "--threads", type=int, metavar="N", help="all of the machine's unless given; never changes a bit"

@@ -5,42 +5,29 @@ to ``@file.mtlx@</MaterialX/Materials/Glass>`` finds the same prims: ``Materials
 ``NodeGraphs``. Two things differ, to the benefit of those who evaluate constants: a node that the document itself
 defines by a graph becomes that graph, and an input that does not fit its definition is left out by itself, not with its
 whole shader. Only surfaces are translated; looks, collections, variants and displacement are not.
-
-Documents are checked before the MaterialX library, which recurses without a limit, sees them.
 """
 
 from __future__ import annotations
 
 import importlib
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
-from xml.parsers import expat
 
 from . import tokens
 from ._pxr import Ar, Gf, Sdf, Tf
 from .description import Diagnostics
+from .documents import MAX_DEPTH, DocumentError, DocumentReader
 
-__all__ = ["DocumentError", "read_document"]
-
-
-class DocumentError(Exception):
-    """A document cannot be read; the message says why and what to do."""
+__all__ = ["read_document"]
 
 
-# Largest document with all it includes, bytes and elements: the standard libraries of MaterialX 1.39, the largest
-# documents that are in use, have 2.5 MB and 40,000. Half a minute is what the largest accepted take to translate.
-_MAX_BYTES = 16_000_000
-_MAX_ELEMENTS = 200_000
-# Documents nest four deep (materialx, nodegraph, node, input); graphs of nodes that are graphs somewhat deeper.
-_MAX_DEPTH = 64
-# Shaders that one node may unfold to where graphs are made of graphs, production graphs having hundreds; and the prims
-# that a document may become, all its materials together.
+# Shaders that one node may unfold to where graphs are made of graphs, production graphs having hundreds; and what a
+# document may become, all its materials together: nodes, and inputs of surfaces (OpenPBR has 41).
 _MAX_UNFOLDED = 2_000
-_MAX_PRIMS = 100_000
+_MAX_UNFOLDED_ALL = 200_000
 
 
 def read_document(identifier: str, diagnostics: Diagnostics) -> Any:
@@ -67,7 +54,7 @@ def read_document(identifier: str, diagnostics: Diagnostics) -> Any:
         raise DocumentError(f"needs MaterialX 1.39 or later, this is {mx.getVersionString()}: pip install 'abbe[mtlx]'")
     document = mx.createDocument()
     try:
-        _Reader(mx).read(document, identifier)
+        DocumentReader(mx).read(document, identifier)
         mx.flattenFilenames(document)
         # Before the library is there to mix with.
         materials = document.getMaterialNodes()
@@ -91,114 +78,6 @@ def _standard_library() -> Any:
     return library
 
 
-class _Reader:
-    """Reads a document with what it includes; included files are looked for beside the one that includes them."""
-
-    def __init__(self, mx: Any) -> None:
-        self._mx = mx
-        self._bytes = 0
-        self._elements = 0
-        self._open: list[str] = []
-
-    def read(self, document: Any, identifier: str) -> None:
-        """Read the file of ``identifier`` into ``document``."""
-        resolved = Ar.GetResolver().Resolve(identifier)
-        if not resolved:
-            raise DocumentError(f"{identifier}: there is no such file: check the path")
-        path = str(resolved)
-        if path in self._open:
-            raise DocumentError(f"{path}: includes itself: remove the xi:include")
-        if len(self._open) >= _MAX_DEPTH:
-            raise DocumentError(f"{path}: is included through more than {_MAX_DEPTH} files: include it directly")
-        text = self._checked(path, resolved)
-        options = self._mx.XmlReadOptions()
-
-        def include(included: Any, file: Any, *_: Any) -> None:
-            name = file.asString().replace("\\", "/")
-            if not self._is_standard(name, path):
-                self.read(included, Ar.GetResolver().CreateIdentifier(name, resolved))
-
-        options.readXIncludeFunction = include
-        self._open.append(path)
-        self._mx.readFromXmlString(document, text, self._mx.FileSearchPath(), options)
-        self._open.pop()
-
-    def _is_standard(self, name: str, includer: str) -> bool:
-        """Return whether a file is one of MaterialX' own, whose definitions are there anyhow."""
-        if Path(includer).parent.joinpath(name).exists():
-            return False
-        search = self._mx.getDefaultDataSearchPath()
-        for part in (name, f"libraries/{name}"):
-            found = Path(search.find(self._mx.FilePath(part)).asString())
-            # What is not found comes back as it is.
-            if found.is_absolute() and found.is_file():
-                return True
-        return False
-
-    def _checked(self, path: str, resolved: Any) -> str:
-        """Return the text of a file that is well-formed, of sensible size and without a document type."""
-        data = _content(path, resolved, _MAX_BYTES - self._bytes)
-        self._bytes += len(data)
-        depth = 0
-        parser = expat.ParserCreate()
-
-        def start(*_: Any) -> None:
-            nonlocal depth
-            depth += 1
-            self._elements += 1
-            if depth > _MAX_DEPTH or self._elements > _MAX_ELEMENTS:
-                raise DocumentError(
-                    f"{path}: has more than {_MAX_ELEMENTS} elements, or more than {_MAX_DEPTH} within each other: "
-                    "split the document"
-                )
-
-        def end(_: str) -> None:
-            nonlocal depth
-            depth -= 1
-
-        def document_type(*_: Any) -> None:
-            raise DocumentError(f"{path}: has a document type (<!DOCTYPE>), which MaterialX does not know: remove it")
-
-        parser.StartElementHandler = start
-        parser.EndElementHandler = end
-        parser.StartDoctypeDeclHandler = document_type
-        try:
-            parser.Parse(data, True)
-            return data.decode("utf-8")
-        except (expat.ExpatError, UnicodeDecodeError) as error:
-            raise DocumentError(f"{path}: is no XML in UTF-8 ({error}): correct the document") from None
-
-
-def _content(path: str, resolved: Any, limit: int) -> bytes:
-    """Return the bytes of a file on disk, or of one in a package or store that the resolver opens."""
-    try:
-        data = _opened(path, resolved, limit)
-    except (OSError, KeyError, zipfile.BadZipFile) as error:
-        raise DocumentError(f"{path}: cannot be read ({error}): check the path") from None
-    if data is None or len(data) > limit:
-        raise DocumentError(
-            f"{path}: is larger than {limit:,} bytes, with what it is included from: split the document"
-        )
-    return data
-
-
-def _opened(path: str, resolved: Any, limit: int) -> bytes | None:
-    """Return the bytes, None if they are known to be too many."""
-    if Path(path).is_file():
-        with open(path, "rb") as file:
-            return file.read(limit + 1)
-    resolver = Ar.GetResolver()
-    if not hasattr(resolver, "OpenAsset"):
-        # Python cannot open assets before USD 25; what stands in a .usdz is in a zip file.
-        package, inner = Ar.SplitPackageRelativePathOuter(path)
-        with zipfile.ZipFile(package) as archive:
-            return archive.read(inner) if archive.getinfo(inner).file_size <= limit else None
-    asset = resolver.OpenAsset(resolved)
-    if asset is None:
-        raise OSError("the resolver does not open it")
-    return bytes(asset.GetBuffer()) if asset.GetSize() <= limit else None
-
-
 @dataclass(frozen=True)
 class _Scope:
     """Where nodes stand that know each other by name: the document, for one material, or a graph."""
@@ -220,7 +99,7 @@ class _Translator:
         self._color_space = document.getActiveColorSpace()
         # Node graphs that stand in the layer, and how many shaders each unfolds to; None while it is being written.
         self._graphs: dict[str, int | None] = {}
-        self._prims = 0
+        self._unfolded = 0
         # Nodes of the document itself that are still to be written below a material.
         self._waiting: list[Any] = []
         self.layer = Sdf.Layer.CreateAnonymous(f"{Path(identifier).name}.usda")
@@ -332,6 +211,7 @@ class _Translator:
 
     def _interface(self, node: Any, definition: Any, prim: Any, material: Any) -> None:
         """Connect every input of the definition to the material, and write there, or connect, those of the node."""
+        self._count(len(definition.getActiveInputs()))
         for declared in definition.getActiveInputs():
             public = self._input(material, declared)
             self._connect(self._input(prim, declared), public.path)
@@ -406,10 +286,12 @@ class _Translator:
         self._count(size)
         return size
 
-    def _count(self, prims: int) -> None:
-        self._prims += prims
-        if self._prims > _MAX_PRIMS:
-            raise DocumentError(f"unfolds to more than {_MAX_PRIMS} nodes for all its materials: split the document")
+    def _count(self, size: int) -> None:
+        self._unfolded += size
+        if self._unfolded > _MAX_UNFOLDED_ALL:
+            raise DocumentError(
+                f"unfolds to more than {_MAX_UNFOLDED_ALL:,} nodes and inputs of surfaces: split the document"
+            )
 
     def _custom_graph(self, definition: Any) -> Any:
         """Return the path of the graph that implements a definition of the document; None if there is none to use."""
@@ -433,7 +315,7 @@ class _Translator:
     def _write_graph(self, name: str, graph: Any, definition: Any = None) -> None:
         """Write a node graph under ``/MaterialX/NodeGraphs``, with the interface of its definition if it has one."""
         self._graphs[name] = None
-        if sum(size is None for size in self._graphs.values()) > _MAX_DEPTH:
+        if sum(size is None for size in self._graphs.values()) > MAX_DEPTH:
             self._graphs[name] = _MAX_UNFOLDED + 1
             return
         path = self._path(tokens.NODE_GRAPHS, name)

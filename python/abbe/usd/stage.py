@@ -18,7 +18,8 @@ from ..errors import NotUsdError, StageError, UsageError
 from . import tokens
 from ._pxr import Ar, Pcp, Sdf, Tf, Usd, UsdUtils
 from .description import Diagnostics
-from .mtlx import DocumentError, read_document
+from .documents import DocumentError
+from .mtlx import read_document
 from .substitution import plain_names, substitute
 from .values import place
 

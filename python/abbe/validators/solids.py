@@ -89,6 +89,14 @@ class _Body:
         normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
         return bool(np.abs(centred @ normal).max() <= _ROUNDING * np.abs(self.points).max())
 
+    @property
+    def is_sheet(self) -> bool:
+        """Whether it has no inside: one flat layer of faces, or two that enclose nothing."""
+        if not self.is_mesh:
+            return False
+        volume, uncertainty = self.volume
+        return self.is_flat or abs(volume) <= uncertainty
+
     @cached_property
     def box(self) -> tuple[F64, F64]:
         """World-space corners."""
@@ -216,10 +224,9 @@ def closed(reading: Reading) -> Iterator[Finding]:
 
 
 def thickness(reading: Reading) -> Iterator[Finding]:
-    """Tell of sheets: one flat layer of faces, or two that enclose nothing."""
+    """Tell of sheets, which have no inside."""
     for body, is_closed in _meshes(reading):
-        volume, uncertainty = body.volume
-        if body.is_flat or (is_closed and abs(volume) <= uncertainty):
+        if body.is_flat or (is_closed and body.is_sheet):
             yield reading.found(
                 "abbe:GlassThickness",
                 "glass-sheet",
@@ -258,7 +265,7 @@ def overlapping(reading: Reading) -> Iterator[Finding]:
     other body and partly outside. Each pair of shapes and materials is told of once, and of very many bodies only the
     first are looked at.
     """
-    bodies = reading.once("bodies", lambda: _bodies(reading))[:_BODIES]
+    bodies = [body for body in reading.once("bodies", lambda: _bodies(reading))[:_BODIES] if not body.is_sheet]
     if len(bodies) < 2:
         return
     low, high = (np.array([body.box[side] for body in bodies]) for side in (0, 1))

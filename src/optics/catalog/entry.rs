@@ -14,12 +14,12 @@ pub struct Entry {
     line: &'static str,
 }
 
-/// The cells of a line, as the head of `catalog.tsv` numbers them.
+/// The cells of a line, as the head of `catalog.tsv` counts them. The second one, the qualifier's key, is there to be sorted
+/// by and searched for.
 #[derive(Clone, Copy)]
 enum Cell {
-    Key,
-    Qualifier,
-    Name,
+    Key = 0,
+    Name = 2,
     Category,
     Status,
     Common,
@@ -154,11 +154,6 @@ impl Entry {
         self.cell(Cell::Key)
     }
 
-    #[cfg(test)]
-    pub(super) fn qualifier(&self) -> &'static str {
-        self.cell(Cell::Qualifier)
-    }
-
     /// What kind of stuff it is.
     pub fn category(&self) -> Category {
         let name = self.cell(Cell::Category);
@@ -263,7 +258,7 @@ impl Entry {
     }
 
     /// Whether the bulk is transparent at the d line, measured by [`CLEAR_TRANSMITTANCE`].
-    fn is_clear(&self) -> bool {
+    pub(super) fn is_clear(&self) -> bool {
         let Some(table) = self.extinction() else { return true };
         let nm = lines::D.nanometers();
         let k = match table.partition_point(|[at, _]| *at < nm) {
@@ -282,10 +277,10 @@ impl Entry {
         self.page().starts_with("specs/")
     }
 
-    /// Whether an everyday object of which only the index is known may be made of it: any glass of a maker, and solids and
-    /// liquids that one meets outside of laboratories, if clear.
-    pub(super) fn is_common_medium(&self) -> bool {
-        self.cell(Cell::Common) == "common" && self.is_clear()
+    /// Whether everyday objects may be made of it: any glass of a maker, and solids and liquids that one meets outside of
+    /// laboratories.
+    pub(super) fn is_common(&self) -> bool {
+        self.cell(Cell::Common) == "common"
     }
 
     /// Orders entries of equal merit.

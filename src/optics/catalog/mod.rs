@@ -67,12 +67,12 @@ pub fn entries() -> impl Iterator<Item = Entry> {
 /// Of two that are as near, the one that its maker prefers comes first, then the one whose name does.
 pub fn nearest(nd: f64) -> Entry {
     let mut best: Option<(f64, Entry)> = None;
-    for entry in entries() {
+    for entry in entries().filter(Entry::is_common) {
         let distance = (entry.nd() - nd).abs();
         let closer = best.is_none_or(|(least, other)| {
             distance.total_cmp(&least).then_with(|| entry.preference().cmp(&other.preference())).is_lt()
         });
-        if closer && entry.is_common_medium() {
+        if closer && entry.is_clear() {
             best = Some((distance, entry));
         }
     }
@@ -83,8 +83,8 @@ pub fn nearest(nd: f64) -> Entry {
 fn resolved(target: &str) -> Entry {
     let (before, after) = target.split_once(':').expect("an alias names an entry in full");
     let (before, after) = (key(before), key(after));
-    lookup::exact(&after, &before)
-        .or_else(|| lookup::exact(&before, &after))
+    lookup::exact(&before, &after)
+        .or_else(|| lookup::exact(&after, &before))
         .expect("an alias names an entry that is there (tested)")
 }
 

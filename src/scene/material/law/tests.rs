@@ -268,7 +268,11 @@ fn impossible_numbers_name_prim_attribute_and_remedy() {
             TABLE,
             "look like µm (0.4): nm are wanted, multiply them by 1000",
         ),
-        (json!({TABLE: pairs(&[[400.0, 0.0], [700.0, 1.49]])}), TABLE, "at 400 nm the index is 0"),
+        (
+            json!({TABLE: pairs(&[[400.0, 0.0], [700.0, 1.49]])}),
+            TABLE,
+            "has the index 0 at 400 nm: it must be positive",
+        ),
         (json!({TABLE: pairs(&[[900.0, 1.5], [1000.0, 1.49]])}), TABLE, "without the d line"),
         (json!({TABLE: doubles(&[400.0, 1.5])}), TABLE, "author a list of pairs of finite numbers of type double2[]"),
         (json!({LAW: token("glass")}), GLASS, "author a name of the catalogue, such as \"SCHOTT:N-BK7\""),
