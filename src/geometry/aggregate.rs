@@ -134,17 +134,19 @@ impl Aggregate {
         nearest.hit
     }
 
-    /// A surface that passes through the start of the ray, within rounding, and that the ray has not crossed there. Casts
-    /// no further than that.
-    pub fn coincident(&self, ray: &Ray, departures: &Departures) -> Option<Hit> {
+    /// A surface of an instance that `is_member`, which passes through the start of the ray, within rounding, and which the
+    /// ray has not crossed there. Casts no further than that.
+    pub fn coincident(&self, ray: &Ray, departures: &Departures, is_member: impl Fn(u32) -> bool) -> Option<Hit> {
         let reach = departures.crossings().iter().map(|c| self.with(c.instance, |placed| placed.reach(c.primitive)));
         let magnitude = ray.origin.abs().max_element() + reach.fold(0.0, f64::max);
         let about = behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest));
         let mut nearest = Nearest { hit: None, limit: about };
         self.tree.walk(ray.origin, ray.direction, -about, about, self.spread, |i, _| {
             let instance = self.instance(i);
-            let standing = Some((departures, magnitude));
-            self.with(instance, |placed| placed.intersect(ray, instance, standing, &mut nearest));
+            if is_member(instance) {
+                let standing = Some((departures, magnitude));
+                self.with(instance, |placed| placed.intersect(ray, instance, standing, &mut nearest));
+            }
             nearest.limit
         });
         nearest.hit.filter(|hit| hit.at_start)

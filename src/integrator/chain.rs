@@ -383,10 +383,9 @@ impl<'a> Walk<'a> {
         departures.depart(&self.ray, &met.hit, true);
         for _ in 0..MAX_COINCIDENT {
             counters.rays += 1;
-            let Some(hit) = self.view.aggregate.coincident(&ahead, &departures) else { break };
+            let Some(hit) = self.view.coincident_backing(&ahead, &departures) else { break };
             let material_id = self.view.material_id(&hit);
-            let kind = self.view.material(&hit).map(|material| &material.kind);
-            if matches!(kind, None | Some(Kind::Opaque | Kind::Mirror { .. })) {
+            if self.view.is_backing(material_id) {
                 let (point, surface) = self.view.aggregate.local_surface(&ahead, &hit);
                 // Met where the glass was, by the ray that met the glass.
                 let hit = Hit { distance: met.hit.distance, at_start: met.hit.at_start, ..hit };

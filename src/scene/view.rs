@@ -68,9 +68,29 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Whether the surface at `hit` can coincide with any other object (glass on a table, the silver behind a mirror).
+    /// Whether the surface at `hit` can coincide with a [backing](Self::is_backing) (glass on a table, the silver behind a
+    /// mirror).
     pub fn is_in_contact(&self, hit: &Hit) -> bool {
-        self.in_contact[hit.instance as usize].or_find(|| self.aggregate.is_touching(hit.instance, |_| true))
+        self.in_contact[hit.instance as usize].or_find(|| {
+            self.has_backing(hit.instance)
+                || self.aggregate.is_touching(hit.instance, |object| self.has_backing(object))
+        })
+    }
+
+    /// Whether a surface with material `id` lets nothing pass: it is opaque or a mirror.
+    pub fn is_backing(&self, id: u32) -> bool {
+        id.checked_sub(1)
+            .is_none_or(|i| matches!(self.scene.materials[i as usize].kind, Kind::Opaque | Kind::Mirror { .. }))
+    }
+
+    fn has_backing(&self, object: u32) -> bool {
+        self.scene.objects.ids(object).material_ids.iter().any(|&id| self.is_backing(id))
+    }
+
+    /// A surface at the start of the ray that has not been crossed, of an object with a backing; objects that are glass all
+    /// over are not asked.
+    pub fn coincident_backing(&self, ray: &Ray, departures: &Departures) -> Option<Hit> {
+        self.aggregate.coincident(ray, departures, |object| self.has_backing(object))
     }
 
     /// `material_id` at `hit`, 0 for none.
