@@ -195,7 +195,8 @@ impl Aggregate {
         Some([all.min, all.max])
     }
 
-    /// Whether the bounds of an instance meet those of another one that `is_member`: only then can their surfaces coincide.
+    /// Whether the bounds of an instance meet the surface of another one that `is_member`, as far as boxes tell: only then can
+    /// their surfaces coincide.
     pub fn is_touching(&self, instance: u32, is_member: impl Fn(u32) -> bool) -> bool {
         let Some(bounds) = self.bounds_of(instance) else { return false };
         // Surfaces that coincide under different transforms differ by rounding of their coordinates.
@@ -210,6 +211,7 @@ impl Aggregate {
                     let margin = margin(bounds.reach().max(other.reach()));
                     bounds.min.cmple(other.max + margin).all() && other.min.cmple(bounds.max + margin).all()
                 })
+                && self.with(other, |placed| placed.may_meet(&search))
         })
     }
 

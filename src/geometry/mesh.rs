@@ -186,6 +186,11 @@ impl Mesh {
         Some(normals.map(|n| widen(n) * sign))
     }
 
+    /// Whether the box of any triangle meets `search`, in object space.
+    pub(super) fn may_meet(&self, search: &Bounds) -> bool {
+        self.tree.any_meeting(search, |_| true)
+    }
+
     /// Calls `found` with every crossing of the ray that is met before the limit, which `found` returns anew each time.
     /// All in object space; `start` is absent for rays that start in the open.
     pub(super) fn walk(

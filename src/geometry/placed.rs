@@ -121,6 +121,17 @@ impl Placed<'_> {
         Some(Bounds { min: center - half - error, max: center + half + error })
     }
 
+    /// Whether some of the surface may lie within `search`, in render space; a no is certain. What stands inside of a room
+    /// without touching it is in its bounds, and in the box of none of its triangles.
+    pub(super) fn may_meet(&self, search: &Bounds) -> bool {
+        let Shape::Mesh(mesh) = self.shape else { return true };
+        let center = self.inverse * (0.5 * (search.min + search.max) - self.translation);
+        let half = absolute(self.inverse) * (0.5 * (search.max - search.min));
+        let rounded = search.reach() + self.reach_of(self.extent());
+        let half = half + DVec3::splat(BOX_ERRORS * UNIT_ROUNDOFF * self.inverse_norm * rounded * self.condition());
+        mesh.may_meet(&Bounds { min: center - half, max: center + half })
+    }
+
     /// Largest coordinate of the shape in object space.
     fn extent(&self) -> f64 {
         match self.shape {

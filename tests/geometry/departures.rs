@@ -210,3 +210,23 @@ proptest! {
         prop_assert!(glass.iter().enumerate().all(|(k, &leaving)| leaving == (k % 2 == 1)), "{:?}", hits);
     }
 }
+
+#[test]
+fn glass_in_a_room_touches_what_it_stands_on_and_not_the_room() {
+    let (room, gem, ball) = (cube(10.0), cube(1.0), sphere(1.0));
+    let turn = DAffine3::from_rotation_y(0.3);
+    for scale in [1e-6, 1.0, 1e6] {
+        // The cubes have a corner at their origin.
+        let place = |corner: f64, height: f64| {
+            let at = DVec3::new(corner, corner + height, corner);
+            DAffine3::from_scale(DVec3::splat(scale)) * turn * DAffine3::from_translation(at)
+        };
+        for (glass, corner, size) in [(&gem, -0.5, 0.5), (&ball, 0.0, 1.0)] {
+            for (height, touches) in [(0.0, false), (size - 4.999, false), (size - 5.0, true), (size - 5.1, true)] {
+                let scene = aggregate(&[placed(glass, place(corner, height)), placed(&room, place(-5.0, 0.0))]);
+                assert_eq!(scene.is_touching(0, |_| true), touches, "{height} at scale {scale}");
+                assert!(!scene.is_touching(0, |_| false));
+            }
+        }
+    }
+}
