@@ -22,24 +22,13 @@ from typing import Any
 
 import numpy as np
 
+from ._colours import hue_and_lightness, srgb, viridis
 from ._files import replacing
 from ._image import channel_name, read_exr
 from .errors import AbbeError, UsageError
 from .manifest import Manifest
 
 __all__ = ["Tile", "contact_sheet", "tiles_of", "write_preview"]
-
-_VIRIDIS = (
-    np.frombuffer(
-        bytes.fromhex(
-            "440154 470d60 48186a 482374 472d7b 453781 424086 3e4989 3b528b 375b8d 33638d 2f6b8e 2c728e 297a8e 26828e "
-            "23898e 21918c 1f988b 1fa088 22a785 28ae80 32b67a 3fbc73 4ec36b 5ec962 70cf57 84d44b 98d83e addc30 c2df23 "
-            "d8e219 ece51b fde725"
-        ),
-        np.uint8,
-    ).reshape(-1, 3)
-    / 255
-)
 
 # Colours saturate beyond this percentile of the magnitude, or below its complement where a scale does not begin at 0.
 _PERCENTILE = 99.0
@@ -359,6 +348,8 @@ def _picture(tile: Tile) -> _Picture:
         return _Picture(np.concatenate([np.mod(values, 1.0), blue], axis=-1), _note("red, green = fractions of u, v"))
     if tile.aov.endswith("position"):
         return _coordinates(values, some)
+    if tile.aov == "internal_transmittance":
+        return _filter(values, some)
     if channels == 2:
         return _vectors(values, some, tile.unit)
     if channels > 1:
@@ -370,14 +361,20 @@ def _picture(tile: Tile) -> _Picture:
     return _scalar(values[:, :, 0], some)
 
 
+def _filter(values: np.ndarray, some: np.ndarray) -> _Picture:
+    """What is left of white light."""
+    least = "  ".join(f"{v:.4g}" for v in values[some].min(axis=0))
+    return _Picture(srgb(values), _note("what is left of white: red, green, blue = x, y, z", f"least values {least}"))
+
+
 def _magnitude(values: np.ndarray, some: np.ndarray, what: str) -> _Picture:
     """Values that begin at 0."""
     inside = values[some]
     high = _robust(inside)
     if high == 0:
-        return _Picture(_viridis(np.zeros_like(values)), _note("0 wherever there is a value"))
+        return _Picture(viridis(np.zeros_like(values)), _note("0 wherever there is a value"))
     note = _saturation(high, float(inside.max()))
-    return _Picture(_viridis(values / high), _bar(_viridis, 0.0, high, f"{what}; {note}" if what else note))
+    return _Picture(viridis(values / high), _bar(viridis, 0.0, high, f"{what}; {note}" if what else note))
 
 
 def _scalar(values: np.ndarray, some: np.ndarray) -> _Picture:
@@ -385,12 +382,12 @@ def _scalar(values: np.ndarray, some: np.ndarray) -> _Picture:
     inside = values[some]
     low, high = _spread(inside)
     if low == high:
-        return _Picture(_viridis(np.full_like(values, 0.5)), _note(f"{low:.7g} wherever there is a value"))
+        return _Picture(viridis(np.full_like(values, 0.5)), _note(f"{low:.7g} wherever there is a value"))
     least, most = float(inside.min()), float(inside.max())
     note = f"all values, {least:.7g} to {most:.7g}"
     if low > least or high < most:
         note = f"percentiles {100 - _PERCENTILE:g} to {_PERCENTILE:g}; values reach {least:.4g} and {most:.4g}"
-    return _Picture(_viridis((values - low) / (high - low)), _bar(_viridis, low, high, note))
+    return _Picture(viridis((values - low) / (high - low)), _bar(viridis, low, high, note))
 
 
 def _depth(values: np.ndarray, some: np.ndarray) -> _Picture:
@@ -425,9 +422,9 @@ def _vectors(values: np.ndarray, some: np.ndarray, unit: str) -> _Picture:
     scale = _robust(length[some])
     most = float(length[some].max())
     if scale == 0:
-        return _Picture(_hue_and_lightness(0 * length, length), _note("0 wherever there is a value"))
+        return _Picture(hue_and_lightness(0 * length, length), _note("0 wherever there is a value"))
     # The root shows directions of small motions too; the wheel of the legend has the same scale.
-    colours = _hue_and_lightness(np.arctan2(values[:, :, 1], values[:, :, 0]), np.sqrt(length / scale))
+    colours = hue_and_lightness(np.arctan2(values[:, :, 1], values[:, :, 0]), np.sqrt(length / scale))
 
     def legend(canvas: _Canvas, box: tuple[int, int, int, int]) -> None:
         from PIL import Image
@@ -437,7 +434,7 @@ def _vectors(values: np.ndarray, some: np.ndarray, unit: str) -> _Picture:
         at = (np.arange(8 * radius) + 0.5) / (4 * radius) - 1
         x, y = np.meshgrid(at, -at)
         distance = np.hypot(x, y)
-        wheel = _hue_and_lightness(np.arctan2(y, x), np.sqrt(distance))
+        wheel = hue_and_lightness(np.arctan2(y, x), np.sqrt(distance))
         wheel = np.where((distance <= 1)[:, :, np.newaxis], wheel, np.array(_PAPER) / 255)
         disc = Image.fromarray(np.round(255 * wheel).astype(np.uint8))
         left, top = box[0], box[1] + 14
@@ -496,7 +493,7 @@ def _counts(values: np.ndarray) -> _Picture:
     """Small whole numbers, one step of viridis each; 0 is black."""
     most = max(int(values.max()), 1)
     steps = min(most, 64)
-    palette = np.vstack([np.zeros((1, 3)), _viridis(np.linspace(0.15, 1.0, steps))])
+    palette = np.vstack([np.zeros((1, 3)), viridis(np.linspace(0.15, 1.0, steps))])
     found = [int(number) for number in np.unique(np.minimum(values, steps))]
 
     def legend(canvas: _Canvas, box: tuple[int, int, int, int]) -> None:
@@ -546,42 +543,6 @@ def _saturation(scale: float, most: float) -> str:
     if most <= scale:
         return f"greatest value {most:.4g}"
     return f"saturates at percentile {_PERCENTILE:g}; greatest value {most:.4g}"
-
-
-def _viridis(t: np.ndarray) -> np.ndarray:
-    """The colour map at 0..1, clamped; shape (..., 3)."""
-    at = np.clip(t, 0, 1) * (len(_VIRIDIS) - 1)
-    low = np.minimum(at.astype(np.intp), len(_VIRIDIS) - 2)
-    part = (at - low)[..., np.newaxis]
-    colours: np.ndarray = _VIRIDIS[low] * (1 - part) + _VIRIDIS[low + 1] * part
-    return colours
-
-
-def _hue_and_lightness(angle: np.ndarray, amount: np.ndarray) -> np.ndarray:
-    """OKLCh by direction and magnitude 0..1 (clamped) as sRGB; the greatest chroma that sRGB has for every hue."""
-    amount = np.clip(amount, 0, 1)
-    lightness = 0.75 * amount
-    chroma = 0.127 * amount
-    # Hue 0.5 rad, a red, points along +x.
-    a, b = chroma * np.cos(angle + 0.5), chroma * np.sin(angle + 0.5)
-    cone = np.stack(
-        [
-            lightness + 0.3963377774 * a + 0.2158037573 * b,
-            lightness - 0.1055613458 * a - 0.0638541728 * b,
-            lightness - 0.0894841775 * a - 1.2914855480 * b,
-        ],
-        axis=-1,
-    )
-    from_cone = np.array(
-        [
-            [4.0767416621, -3.3077115913, 0.2309699292],
-            [-1.2684380046, 2.6097574011, -0.3413193965],
-            [-0.0041960863, -0.7034186147, 1.7076147010],
-        ]
-    )
-    linear = np.clip(cone**3 @ from_cone.T, 0, 1)
-    coded: np.ndarray = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return coded
 
 
 def _bar(ramp: Callable[[np.ndarray], np.ndarray], low: float, high: float, note: str) -> Callable[..., None]:

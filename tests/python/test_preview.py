@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from abbe import preview
+from abbe import _colours, preview
 from abbe.errors import AbbeError, UsageError
 from abbe.preview import Tile, contact_sheet, write_preview
 
@@ -93,21 +93,21 @@ def test_a_file_shows_what_the_film_shows(tmp_path):
 
 def test_directions_are_hues_and_lengths_lightness():
     angle = np.linspace(0, 2 * np.pi, 100, endpoint=False)
-    rim = preview._hue_and_lightness(angle, np.ones(100))
+    rim = _colours.hue_and_lightness(angle, np.ones(100))
     # Inside sRGB: nothing is clipped, so hues differ and are equally light.
     assert rim.min() >= 0
     assert rim.max() <= 1
     distances = np.linalg.norm(rim - np.roll(rim, 50, axis=0), axis=-1)
     assert distances.min() > 0.3
-    lightness = preview._hue_and_lightness(np.full(20, 1.0), np.linspace(0, 1, 20)).sum(axis=-1)
+    lightness = _colours.hue_and_lightness(np.full(20, 1.0), np.linspace(0, 1, 20)).sum(axis=-1)
     assert np.all(np.diff(lightness) > 0)
-    assert np.all(preview._hue_and_lightness(np.zeros(1), np.zeros(1)) == 0)
+    assert np.all(_colours.hue_and_lightness(np.zeros(1), np.zeros(1)) == 0)
 
 
 def test_viridis_goes_from_dark_to_light():
-    colours = preview._viridis(np.linspace(-1, 2, 300))
-    assert np.array_equal(colours[0], preview._VIRIDIS[0])
-    assert np.array_equal(colours[-1], preview._VIRIDIS[-1])
+    colours = _colours.viridis(np.linspace(-1, 2, 300))
+    assert np.array_equal(colours[0], _colours.VIRIDIS[0])
+    assert np.array_equal(colours[-1], _colours.VIRIDIS[-1])
     luminance = colours**2.2 @ [0.2126, 0.7152, 0.0722]
     assert np.all(np.diff(luminance) >= 0)
 
@@ -117,8 +117,8 @@ def test_a_few_extreme_pixels_do_not_set_the_scale():
     values[:90] = 0
     values[99, :5] = 1e6
     picture = preview._picture(Tile("dispersion_footprint", "dispersion_footprint", values))
-    assert np.allclose(picture.colours[95, 50], preview._VIRIDIS[-1])
-    assert np.allclose(picture.colours[0, 0], preview._VIRIDIS[0])
+    assert np.allclose(picture.colours[95, 50], _colours.VIRIDIS[-1])
+    assert np.allclose(picture.colours[0, 0], _colours.VIRIDIS[0])
 
 
 def test_absent_and_broken_values_show_the_checker():
