@@ -95,8 +95,78 @@ pub enum Shape {
         /// Radius > 0.
         radius: f64,
     },
+    /// A cube about the origin.
+    Cube {
+        /// Prim path.
+        path: String,
+        /// Length of its edges.
+        size: f64,
+    },
+    /// A rectangle about the origin, facing along its axis.
+    Plane {
+        /// Prim path.
+        path: String,
+        /// Along x; along z for the axis X.
+        width: f64,
+        /// Along y; along z for the axis Y.
+        length: f64,
+        /// `X`, `Y` or `Z`.
+        axis: String,
+    },
+    /// A cylinder or truncated cone about the origin.
+    Cylinder {
+        /// Prim path.
+        path: String,
+        /// Along the axis.
+        height: f64,
+        /// At −height/2.
+        radius_bottom: f64,
+        /// At +height/2.
+        radius_top: f64,
+        /// `X`, `Y` or `Z`.
+        axis: String,
+    },
+    /// A cone about the origin, its tip towards +axis.
+    Cone {
+        /// Prim path.
+        path: String,
+        /// Along the axis.
+        height: f64,
+        /// Of the base.
+        radius: f64,
+        /// `X`, `Y` or `Z`.
+        axis: String,
+    },
+    /// A truncated cone between half spheres, about the origin.
+    Capsule {
+        /// Prim path.
+        path: String,
+        /// Along the axis, half spheres excluded.
+        height: f64,
+        /// Of the half sphere at −height/2.
+        radius_bottom: f64,
+        /// Of the half sphere at +height/2.
+        radius_top: f64,
+        /// `X`, `Y` or `Z`.
+        axis: String,
+    },
     /// A polygon mesh.
     Mesh(Mesh),
+}
+
+impl Shape {
+    /// Its prim path.
+    pub fn path(&self) -> &str {
+        match self {
+            Self::Sphere { path, .. }
+            | Self::Cube { path, .. }
+            | Self::Plane { path, .. }
+            | Self::Cylinder { path, .. }
+            | Self::Cone { path, .. }
+            | Self::Capsule { path, .. } => path,
+            Self::Mesh(mesh) => &mesh.path,
+        }
+    }
 }
 
 /// A polygon mesh as authored.

@@ -7,6 +7,7 @@ pub mod builder;
 pub mod description;
 pub mod file;
 pub mod material;
+mod solids;
 pub mod view;
 
 use std::collections::BTreeMap;

@@ -22,6 +22,7 @@ from .description import Description, Diagnostics
 from .geometry import ShapeReader
 from .materials import MaterialReader
 from .render import find_settings, read_settings, token_list
+from .solids import solid_kind
 from .stage import (
     OpenedStage,
     Overrides,
@@ -45,6 +46,7 @@ class _Kind(enum.Enum):
 
     MESH = enum.auto()
     SPHERE = enum.auto()
+    SOLID = enum.auto()
     CAMERA = enum.auto()
     LIGHT = enum.auto()
     UNSUPPORTED = enum.auto()
@@ -61,6 +63,8 @@ def _classify(prim: Any) -> _Kind:
         return _Kind.MESH
     if prim.IsA(UsdGeom.Sphere):
         return _Kind.SPHERE
+    if solid_kind(prim) is not None:
+        return _Kind.SOLID
     if prim.IsA(UsdGeom.Camera):
         return _Kind.CAMERA
     if prim.HasAPI(UsdLux.LightAPI) or any(prim.IsA(base) for base in _light_schemas()):
@@ -196,6 +200,8 @@ class _Walk:
             self._place(prim, path, self.shapes.mesh(prim, source), state)
         elif kind is _Kind.SPHERE:
             self._place(prim, path, self.shapes.sphere(prim, source), state)
+        elif kind is _Kind.SOLID:
+            self._place(prim, path, self.shapes.solid(prim, source), state)
         elif kind is _Kind.SKELETAL:
             self.diagnostics.warn(
                 "unsupported-prim", place(prim), "skinning is not supported; meshes below are rendered as authored"
@@ -343,7 +349,7 @@ def _read(
         stage, settings_prim, time, time_code or 0.0, product, camera_index, bool(camera), source, diagnostics
     )
     if not placements:
-        diagnostics.warn("nothing-to-render", source, "the stage has no mesh or sphere to render: every ray misses")
+        diagnostics.warn("nothing-to-render", source, "the stage has no geometry to render: every ray misses")
 
     document = {
         "format": FORMAT,

@@ -31,8 +31,16 @@ DRAW_MODE: Final = "model:drawMode"
 APPLY_DRAW_MODE: Final = "model:applyDrawMode"
 FULL_DRAW_MODES: Final = ("default", "inherited", "")
 
-# Sphere.
+# Sphere, Cube, Plane, Cylinder, Cone, Capsule.
 RADIUS: Final = "radius"
+RADIUS_BOTTOM: Final = "radiusBottom"
+RADIUS_TOP: Final = "radiusTop"
+HEIGHT: Final = "height"
+WIDTH: Final = "width"
+LENGTH: Final = "length"
+SIZE: Final = "size"
+AXIS: Final = "axis"
+AXES: Final = ("X", "Y", "Z")
 
 # Mesh.
 POINTS: Final = "points"
