@@ -11,8 +11,8 @@
 //! | layer | what it knows |
 //! |---|---|
 //! | [`math`], [`error`], [`diagnostics`], `atomic` | compensated arithmetic; errors; structured warnings; files whole or not at all |
-//! | [`spectrum`] | wavelengths, lines, responses |
-//! | [`optics`] | n(λ) and its derivatives, media and their priorities |
+//! | [`spectrum`] | wavelengths, lines, responses, colours made spectra |
+//! | [`optics`] | n(λ) and its derivatives, absorption, media and their priorities |
 //! | [`ray`] | columns, transfer, scattering, footprint, chromatic motion: the calculus |
 //! | [`geometry`] | shapes, instances, trees, hits |
 //! | [`camera`], [`sampler`] | where rays begin |

@@ -7,7 +7,7 @@ mod support;
 
 use abbe::film::aov::AOVS;
 use abbe::film::{SampleRange, Values};
-use abbe::integrator::chain::{Chain, Counters, End, Follower};
+use abbe::integrator::chain::{Chain, Counters, End, Follower, Record};
 use abbe::ray::{ColumnSet, NoColumns, ScreenColumns, SecondOrderColumns};
 use abbe::render::Request;
 use abbe::scene::Scene;
@@ -33,7 +33,7 @@ impl Bench<'_> {
     fn chain<C: ColumnSet>(&self, raster: DVec2, nm: f64) -> Chain<C> {
         let media = Media::at(self.scene, Wavelength::from_nanometers(nm), 1.0).unwrap();
         let follower = Follower::new(self.view);
-        follower.follow(&self.camera.ray(raster.x, raster.y), &media, None, &mut Counters::default())
+        follower.follow(&self.camera.ray(raster.x, raster.y), &media, Record::none(), &mut Counters::default())
     }
 
     fn end(&self, raster: DVec2, nm: f64) -> Option<DVec3> {

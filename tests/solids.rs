@@ -5,7 +5,7 @@
 
 mod support;
 
-use abbe::integrator::chain::{Counters, End, Follower};
+use abbe::integrator::chain::{Counters, End, Follower, Record};
 use abbe::ray::{ColumnSet, NoColumns, RayStart, SecondOrderColumns};
 use abbe::scene::Scene;
 use abbe::scene::description::Shape;
@@ -73,7 +73,7 @@ fn trace<C: ColumnSet>(scene: &Scene, view: &View<'_>, x: f64, y: f64, nanometer
     let media = Media::at(scene, Wavelength::from_nanometers(nanometers), 1.0).expect("indices");
     let mut counters = Counters::default();
     let mut log = Vec::new();
-    let chain = Follower::new(view).follow::<C>(&start(x, y), &media, Some(&mut log), &mut counters);
+    let chain = Follower::new(view).follow::<C>(&start(x, y), &media, Record { log: Some(&mut log), ..Record::default() }, &mut counters);
     let End::Surface(end) = chain.end else { return None };
     assert_eq!(counters.unmatched_exits, 0);
     let kinds = log.iter().filter_map(|step| step.scattering.as_ref().map(|s| s.kind as u32)).collect();

@@ -14,7 +14,8 @@ from typing import Any, Literal
 import numpy as np
 
 from . import __version__, _core
-from .schemas import plugin_path, register
+from .schemas import SHADER, plugin_path, register_shader, schemas_are_known
+from .validators import VALIDATORS, registered_validators
 
 __all__ = ["Finding", "examine"]
 
@@ -54,19 +55,42 @@ def _usd_finding() -> Finding:
     return Finding("USD", "ok", f"{year}.{month:02}, resolver {resolver}, {Path(str(usd.__file__)).parent}")
 
 
-def _schema_finding() -> Finding:
+def _plugin_findings() -> list[Finding]:
+    """Look at the plug-in: its files, and what of it USD knows."""
     folder = plugin_path()
-    missing = [name for name in ("plugInfo.json", "generatedSchema.usda") if not (folder / name).is_file()]
+    files = ("plugInfo.json", "generatedSchema.usda", f"{SHADER}.usda")
+    missing = [name for name in files if not (folder / name).is_file()]
     if missing:
-        return Finding("schemas", "broken", f"{folder} lacks {', '.join(missing)}: install abbe again")
+        return [Finding("plug-in", "broken", f"{folder} lacks {', '.join(missing)}: install abbe again")]
     try:
-        usd: Any = importlib.import_module("pxr.Usd")
+        importlib.import_module("pxr.Usd")
     except ImportError:
-        return Finding("schemas", "ok", f"{folder}, no USD to register them with")
-    if not register():
-        return Finding("schemas", "broken", f"{folder} is not known to USD: set PXR_PLUGINPATH_NAME to it")
-    known = usd.SchemaRegistry().FindAppliedAPIPrimDefinition("AbbeDispersionAPI") is not None
-    return Finding("schemas", "ok" if known else "broken", f"{folder}, {'known' if known else 'not known'} to USD")
+        return [Finding("plug-in", "ok", f"{folder}, no USD to register it with")]
+    known = schemas_are_known()
+    remedy = "known to USD" if known else f"not known to USD: set PXR_PLUGINPATH_NAME={folder}"
+    return [
+        Finding("plug-in", "ok" if known else "broken", f"schemas {remedy}, {folder}"),
+        _shader_finding(),
+        _validators_finding(),
+    ]
+
+
+def _shader_finding() -> Finding:
+    reason = register_shader()
+    if reason:
+        return Finding(
+            SHADER, "absent", f"not in USD's shader registry ({reason}); stages that use it render all the same"
+        )
+    return Finding(SHADER, "ok", "in USD's shader registry")
+
+
+def _validators_finding() -> Finding:
+    count = registered_validators()
+    if count is None:
+        reason = "this USD takes no validators from Python, 26.05 and later do"
+        return Finding("validators", "absent", f"not in UsdValidation ({reason}); abbe validate runs them all the same")
+    whole = count == len(VALIDATORS)
+    return Finding("validators", "ok" if whole else "broken", f"{count} of {len(VALIDATORS)} in UsdValidation")
 
 
 def _optional(what: str, module: str, extra: str, use: str, version: Callable[[Any], str]) -> Finding:
@@ -92,7 +116,7 @@ def examine() -> list[Finding]:
         Finding("Python", "ok", f"{platform.python_version()}, {sys.executable}"),
         Finding("NumPy", "ok", f"{np.__version__}, {Path(np.__file__).parent}"),
         _usd_finding(),
-        _schema_finding(),
+        *_plugin_findings(),
         _optional("OpenImageIO", "OpenImageIO", "check", "for abbe check", lambda oiio: str(oiio.VERSION_STRING)),
         _optional("Pillow", "PIL", "preview", "for --preview", lambda pil: str(pil.__version__)),
         _optional(

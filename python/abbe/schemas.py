@@ -1,18 +1,32 @@
-"""The USD plug-in folder in this package: where it is, and making it known to a USD that is there.
+"""The USD plug-in in this package: where it is, and making it known to USD.
 
-Reading a stage never needs it: the bridge reads attributes by name. ``prim.ApplyAPI("AbbeDispersionAPI")`` does.
+Three things are made known:
+
+* the schemas, as soon as ``pxr.Plug`` is imported: before the first stage, since a process reads the schemas that
+  there are once and for all;
+* the shader ``AbbeGlass``, with the first ``Sdr.Registry()`` or ``UsdValidation.ValidationRegistry()``: making the
+  registry of shaders reads the schemas, and must not happen before others have registered theirs;
+* the validators, with the first ``UsdValidation.ValidationRegistry()``.
+
+Where a stage is open already all of it happens at once. A program that does not use USD does not pay for it: ``pxr``
+takes longer to import than all the rest. Reading a stage needs none of the three: the bridge reads attributes by name.
 """
 
 from __future__ import annotations
 
 import importlib
-import importlib.util
+import importlib.abc
 import sys
 import warnings
+from collections.abc import Callable, Sequence
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
-__all__ = ["plugin_path", "register"]
+__all__ = ["SHADER", "plugin_path", "register", "register_shader", "schemas_are_known"]
 
+SHADER = "AbbeGlass"
 # Any one of our schemas tells whether USD knows them.
 _A_SCHEMA = "AbbeDispersionAPI"
 
@@ -23,38 +37,164 @@ def plugin_path() -> Path:
     Returns
     -------
     Path
-        Absolute; holds ``plugInfo.json`` and ``generatedSchema.usda``.
+        Absolute; holds ``plugInfo.json``, ``generatedSchema.usda`` and ``AbbeGlass.usda``.
     """
     return Path(__file__).resolve().parent / "plugin"
 
 
-def register() -> bool:
-    """Make the schemas known to USD, if a ``pxr`` can be imported.
+def register() -> None:
+    """Make the plug-in known to those USD modules that are imported, and to the others once they are.
 
-    USD reads schemas once, when the first stage needs them. Where that has happened already, they stay unknown to this
-    process, which is warned of.
-
-    Returns
-    -------
-    bool
-        Whether USD knows the schemas now (or will, once it reads any).
+    Warns where a stage was opened before, so that the schemas came too late. Calling it again does no harm.
     """
-    if "pxr" not in sys.modules and importlib.util.find_spec("pxr") is None:
-        return False
-    try:
-        plug = importlib.import_module("pxr.Plug")
-    except ImportError:
-        # A broken USD is reported where one is needed, with its reason; the rest of the package works without.
-        return False
+    actions: dict[str, Callable[[], None]] = {
+        "pxr.Plug": _register_schemas,
+        "pxr.Usd": _check_order,
+        "pxr.Sdr": _expect_shaders,
+        "pxr.UsdValidation": _expect_validation,
+    }
+    sys.meta_path[:] = [finder for finder in sys.meta_path if not isinstance(finder, _Afterwards)]
+    later = {name: action for name, action in actions.items() if name not in sys.modules}
+    if later:
+        sys.meta_path.insert(0, _Afterwards(later))
+    for name, action in actions.items():
+        if name not in later:
+            action()
+
+
+class _Afterwards(importlib.abc.MetaPathFinder):
+    """Calls a function after a module was imported; how it is found and loaded is left to the other finders."""
+
+    def __init__(self, actions: dict[str, Callable[[], None]]) -> None:
+        self._actions = actions
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        action = self._actions.get(fullname)
+        if action is None:
+            return None
+        others = (finder for finder in sys.meta_path if finder is not self and hasattr(finder, "find_spec"))
+        spec = next(filter(None, (finder.find_spec(fullname, path, target) for finder in others)), None)
+        if spec is None or spec.loader is None:
+            return None
+        loader: Any = spec.loader
+        execute = loader.exec_module
+
+        def exec_module(module: ModuleType) -> None:
+            del loader.exec_module
+            execute(module)
+            if self._actions.pop(fullname, None) is not None:
+                action()
+
+        # On this one object, which loads this one module: the class stays as it is.
+        loader.exec_module = exec_module
+        return spec
+
+
+def _register_schemas() -> None:
+    plug: Any = importlib.import_module("pxr.Plug")
     plug.Registry().RegisterPlugins(str(plugin_path()))
-    usd = sys.modules.get("pxr.Usd")
-    if usd is None:
-        return True
-    if usd.SchemaRegistry().FindAppliedAPIPrimDefinition(_A_SCHEMA) is None:
+
+
+def _a_stage_may_be_open() -> bool:
+    """Tell whether USD may have read its schemas. Asking it for them would make it read them, so its layers tell."""
+    sdf: Any = importlib.import_module("pxr.Sdf")
+    return bool(sdf.Layer.GetLoadedLayers())
+
+
+def schemas_are_known() -> bool:
+    """Return whether USD knows the schemas; it reads all there are now if it has not yet."""
+    usd: Any = importlib.import_module("pxr.Usd")
+    return usd.SchemaRegistry().FindAppliedAPIPrimDefinition(_A_SCHEMA) is not None
+
+
+def _check_order() -> None:
+    if _a_stage_may_be_open() and not schemas_are_known():
         warnings.warn(
             "abbe's schemas came too late for USD, which had read its own: import abbe before opening a stage, or set "
             f"PXR_PLUGINPATH_NAME={plugin_path()}; rendering does not need them",
-            stacklevel=2,
+            # Past register and the package, to whoever imports it.
+            stacklevel=4,
         )
-        return False
-    return True
+
+
+def _expect_shaders() -> None:
+    sdr: Any = importlib.import_module("pxr.Sdr")
+    if _takes_definitions(sdr):
+        _at_first_use(sdr.Registry, register_shader)
+
+
+def _expect_validation() -> None:
+    from .validators import register_validators
+
+    def act() -> None:
+        register_validators()
+        # USD's validators look shaders up without Python, which would not be noticed here.
+        register_shader()
+
+    validation: Any = importlib.import_module("pxr.UsdValidation")
+    _at_first_use(validation.ValidationRegistry, act)
+
+
+def _at_first_use(registry: Any, action: Callable[[], object]) -> None:
+    """Call ``action`` when Python first asks for a registry of USD, or now if that cannot do harm any more.
+
+    The class is as it was from then on.
+    """
+    if _a_stage_may_be_open():
+        action()
+        return
+    original = vars(registry)["__new__"]
+    if getattr(original.__func__, "__module__", None) == __name__:
+        return
+
+    def first(cls: Any, *arguments: Any) -> Any:
+        registry.__new__ = original
+        action()
+        return registry.__new__(cls, *arguments)
+
+    registry.__new__ = staticmethod(first)
+
+
+def _takes_definitions(sdr: Any) -> bool:
+    # Since USD 25.02.
+    return hasattr(sdr.Registry, "AddDiscoveryResult")
+
+
+def register_shader() -> str:
+    """Make ``AbbeGlass`` known to Sdr now; USD reads its schemas for that if it has not yet.
+
+    Returns
+    -------
+    str
+        Why it could not be; empty if it is known.
+    """
+    usd: Any = importlib.import_module("pxr.Usd")
+    sdr: Any = importlib.import_module("pxr.Sdr")
+    shade: Any = importlib.import_module("pxr.UsdShade")
+    tf: Any = importlib.import_module("pxr.Tf")
+    if not _takes_definitions(sdr):
+        year, month = usd.GetVersion()[1:]
+        return f"Sdr of USD {year}.{month:02} takes no definitions from Python, 25.02 and later do"
+
+    def insistent(call: Callable[[], Any]) -> Any:
+        # What USD complains of once is done all the same: usd-core 24 and 25 lack a file of usdHydra's, which the
+        # making of the registry reports, and reading our definition reports that Sdr has no name for doubles.
+        try:
+            return call()
+        except tf.ErrorException:
+            return call()
+
+    registry = insistent(sdr.Registry)
+    if insistent(lambda: registry.GetShaderNodeByIdentifier(SHADER)):
+        return ""
+    path = str(plugin_path() / f"{SHADER}.usda")
+    stage = usd.Stage.Open(path)
+    results = getattr(shade.ShaderDefUtils, "GetDiscoveryResults", None) or shade.ShaderDefUtils.GetNodeDiscoveryResults
+    for result in results(shade.Shader(stage.GetPrimAtPath(f"/{SHADER}")), path):
+        registry.AddDiscoveryResult(result)
+    # Read now, so that the host never sees those complaints.
+    if not insistent(lambda: registry.GetShaderNodeByIdentifier(SHADER)):
+        return f"Sdr did not take {path}"
+    return ""

@@ -13,7 +13,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::integrator::chain::{Chain, Counters, End, Follower};
+use crate::integrator::chain::{Chain, Counters, End, Follower, Record};
 use crate::ray::{
     ColumnSet, Curvature, LambdaColumn, NoColumns, NormalField, RayStart, ScreenColumns, SecondOrderColumns, Step,
     second_order_along,
@@ -136,11 +136,11 @@ impl Tracer<'_> {
     }
 
     fn logged(&self, start: &RayStart, media: &Media, log: &mut Vec<Step>) -> Chain<NoColumns> {
-        self.follower.follow(start, media, Some(log), &mut Counters::default())
+        self.follower.follow(start, media, Record::of_steps(log), &mut Counters::default())
     }
 
     fn follow<C: ColumnSet>(&self, start: &RayStart, media: &Media) -> Chain<C> {
-        self.follower.follow(start, media, None, &mut Counters::default())
+        self.follower.follow(start, media, Record::none(), &mut Counters::default())
     }
 }
 
@@ -256,7 +256,8 @@ fn methods(tracer: &Tracer<'_>, nm: f64, cases: &[Case], rounds: usize) -> Resul
             let mut log: Vec<Step> = Vec::new();
             Box::new(move |start| {
                 let mut counters = Counters::default();
-                let _: Chain<NoColumns> = tracer.follower.follow(start, media, Some(&mut log), &mut counters);
+                let _: Chain<NoColumns> =
+                    tracer.follower.follow(start, media, Record::of_steps(&mut log), &mut counters);
                 let medium = tracer.follower.start_medium(media);
                 Some(single::lambda_column(start, &medium, &log))
             })
@@ -346,7 +347,7 @@ fn costs(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart], rounds: usize) -> Re
         let mut counters = Counters::default();
         let begin = Instant::now();
         for start in starts {
-            black_box(tracer.follower.follow::<C>(black_box(start), media, None, &mut counters));
+            black_box(tracer.follower.follow::<C>(black_box(start), media, Record::none(), &mut counters));
         }
         (begin.elapsed().as_secs_f64(), counters.rays)
     }
@@ -356,8 +357,12 @@ fn costs(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart], rounds: usize) -> Re
         let medium = tracer.follower.start_medium(&media);
         let begin = Instant::now();
         for start in starts {
-            let chain =
-                tracer.follower.follow::<ScreenColumns>(black_box(start), &media, Some(&mut log), &mut counters);
+            let chain = tracer.follower.follow::<ScreenColumns>(
+                black_box(start),
+                &media,
+                Record::of_steps(&mut log),
+                &mut counters,
+            );
             if chain.is_dispersive {
                 black_box(second_order_along(start, &medium, DVec3::ONE, &log));
             }

@@ -87,6 +87,9 @@ const fn first(name: &'static str, unit: &'static str, family: Family, doc: &'st
     Aov { name, channels: I, sample: SampleType::Uint, unit, merge: Merge::First, has_validity: false, family, doc }
 }
 
+/// The one AOV that the absorption of media is summed for.
+pub const INTERNAL_TRANSMITTANCE: &str = "internal_transmittance";
+
 /// Every AOV of the geometric and differential passes.
 pub static AOVS: &[Aov] = &[
     mean(
@@ -154,6 +157,13 @@ pub static AOVS: &[Aov] = &[
         "1",
         Family::Chain,
         "Abbe number (d, F, C) of the first dielectric entered; absent where it is constant",
+    ),
+    mean(
+        INTERNAL_TRANSMITTANCE,
+        XYZ,
+        "1",
+        Family::Chain,
+        "what the media leave of the light, ∏ exp(−σ·length) along the chain at the reference wavelength: X, Y, Z at the wavelengths of the red, green, blue responses",
     ),
     first("interfaces", "count", Family::Chain, "specular events on the chain"),
     first(

@@ -6,6 +6,7 @@
 
 use glam::DVec3;
 
+use super::transmittance::Segment;
 use crate::geometry::{Departures, Hit, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
@@ -98,6 +99,8 @@ pub struct Counters {
     pub exhausted: u64,
     /// Events redone with the geometric normal.
     pub geometric_normal_events: u64,
+    /// Media left inside of another of the same priority: objects that overlap undecided.
+    pub undecided_overlaps: u64,
 }
 
 impl Counters {
@@ -113,6 +116,7 @@ impl Counters {
             unmatched_exits: f(self.unmatched_exits, other.unmatched_exits),
             exhausted: f(self.exhausted, other.exhausted),
             geometric_normal_events: f(self.geometric_normal_events, other.geometric_normal_events),
+            undecided_overlaps: f(self.undecided_overlaps, other.undecided_overlaps),
         }
     }
 
@@ -124,6 +128,50 @@ impl Counters {
     /// What was counted since `earlier`.
     pub fn since(&self, earlier: &Self) -> Self {
         self.combine(earlier, |now, before| now - before)
+    }
+}
+
+/// What a chain writes down as it goes; whatever is not asked for is not kept.
+#[derive(Debug, Default)]
+pub struct Record<'r> {
+    /// Every event with its transfer, and the last transfer: what a second chain replays.
+    pub steps: Option<&'r mut Vec<Step>>,
+    /// Every segment with its medium: one for each step, and the last one of a miss.
+    pub segments: Option<&'r mut Vec<Segment>>,
+}
+
+impl<'r> Record<'r> {
+    /// Nothing.
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// Only what a second chain replays.
+    pub fn of_steps(steps: &'r mut Vec<Step>) -> Self {
+        Self { steps: Some(steps), segments: None }
+    }
+
+    fn clear(&mut self) {
+        if let Some(steps) = self.steps.as_deref_mut() {
+            steps.clear();
+        }
+        if let Some(segments) = self.segments.as_deref_mut() {
+            segments.clear();
+        }
+    }
+
+    #[inline]
+    fn step(&mut self, transfer: &Transfer, scattering: Option<&Scattering>) {
+        if let Some(steps) = self.steps.as_deref_mut() {
+            steps.push(Step { transfer: *transfer, scattering: scattering.copied() });
+        }
+    }
+
+    #[inline]
+    fn segment(&mut self, length: f64, medium: Option<MediumId>) {
+        if let Some(segments) = self.segments.as_deref_mut() {
+            segments.push(Segment { medium, length });
+        }
     }
 }
 
@@ -161,17 +209,17 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Follows the chain of `start` with the indices of `media`, carrying the columns `C`.
-    ///
-    /// `log` receives every event with its transfer, and the last transfer: what a second chain replays.
+    /// Follows the chain of `start` with the indices of `media`, carrying the columns `C`. What stands in `record` is
+    /// replaced.
     pub fn follow<C: ColumnSet>(
         &self,
         start: &RayStart,
         media: &Media,
-        mut log: Option<&mut Vec<Step>>,
+        mut record: Record<'_>,
         counters: &mut Counters,
     ) -> Chain<C> {
         counters.chains += 1;
+        record.clear();
         let mut walk = Walk::new(self, start);
         let mut medium = media.of(walk.media.current());
         let mut chain = Chain {
@@ -189,9 +237,6 @@ impl<'a> Follower<'a> {
         };
         let columns_carried = u64::from(C::LAMBDA) + 2 * u64::from(C::SCREEN) + u64::from(C::SECOND);
         let mut momentum = medium.ior * start.direction;
-        if let Some(log) = log.as_deref_mut() {
-            log.clear();
-        }
         while let Some(met) = walk.advance(counters) {
             let cut_out = walk.is_cut_out(&met);
             if !cut_out && chain.first.is_none() {
@@ -212,13 +257,14 @@ impl<'a> Follower<'a> {
                 n_g: met.surface.n_g,
                 curvature: met.surface.curvature,
             };
+            // Asked before the event, which may change it; only where it is written down.
+            let travelled = if record.segments.is_some() { walk.media.current() } else { None };
             let (scattering, rough) = match walk.event(&met, media, &medium, momentum, counters) {
                 Event::End => {
                     chain.columns.transfer(&transfer);
                     counters.column_updates += columns_carried;
-                    if let Some(log) = log.as_deref_mut() {
-                        log.push(Step { transfer, scattering: None });
-                    }
+                    record.step(&transfer, None);
+                    record.segment(transfer.distance, travelled);
                     chain.end = End::Surface(met);
                     break;
                 }
@@ -256,8 +302,9 @@ impl<'a> Follower<'a> {
             match scattering.kind {
                 ScatterKind::Refraction => {
                     chain.is_dispersive |= !(scattering.ior_i.is_constant() && scattering.ior_t.is_constant());
-                    if chain.dielectric_id == 0 && !met.hit.leaving {
-                        chain.dielectric_id = met.material_id;
+                    // Not the surface's material: of coincident surfaces rounding decides which one is met.
+                    if chain.dielectric_id == 0 {
+                        chain.dielectric_id = walk.media.current().map_or(0, |id| id.0 + 1);
                     }
                     medium = scattering.ior_t;
                 }
@@ -266,9 +313,11 @@ impl<'a> Follower<'a> {
             }
             momentum = scattering.momentum_out;
             walk.turn(&met, momentum / medium.ior, &scattering);
-            if let Some(log) = log.as_deref_mut() {
-                log.push(Step { transfer, scattering: Some(scattering) });
-            }
+            record.step(&transfer, Some(&scattering));
+            record.segment(transfer.distance, travelled);
+        }
+        if matches!(chain.end, End::Miss) {
+            record.segment(f64::INFINITY, walk.media.current());
         }
         counters.exhausted += u64::from(matches!(chain.end, End::Exhausted));
         chain.direction = walk.ray.direction;
@@ -393,6 +442,7 @@ impl<'a> Walk<'a> {
             return FarSide { medium, inside, cluster: None };
         }
         let mut cluster = Cluster { media: self.media.clone(), departures: self.departures };
+        let mut is_alone = true;
         self.include(&mut cluster, &met.hit, inside, counters);
         let ahead = Ray { origin: met.point, direction: self.ray.direction };
         for _ in 0..MAX_COINCIDENT {
@@ -402,7 +452,14 @@ impl<'a> Walk<'a> {
             if inside.is_none() {
                 break;
             }
+            is_alone = false;
             self.include(&mut cluster, &hit, inside, counters);
+        }
+        if let Some(inside) = inside
+            && met.hit.leaving
+            && is_alone
+        {
+            counters.undecided_overlaps += u64::from(self.media.is_undecided(&inside));
         }
         FarSide { medium: cluster.media.current(), inside, cluster: Some(cluster) }
     }

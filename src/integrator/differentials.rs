@@ -6,10 +6,11 @@
 
 use glam::{DVec2, DVec3};
 
-use super::chain::{Chain, Counters, End, Follower, SurfacePoint};
+use super::chain::{Chain, Counters, End, Follower, Record, SurfacePoint};
+use super::transmittance::{Coefficients, Segment};
 use super::{Columns, Integrator, PreparedIntegrator, Task, Worker};
 use crate::error::{Error, Result};
-use crate::film::aov::{AOVS, Aov, Family};
+use crate::film::aov::{AOVS, Aov, Family, INTERNAL_TRANSMITTANCE};
 use crate::film::pixel::PixelAccumulator;
 use crate::optics::IorJet;
 use crate::ray::{
@@ -54,6 +55,7 @@ enum Output {
     Ior,
     IorByLambda,
     AbbeNumber,
+    InternalTransmittance,
     Interfaces,
     RoughInterfaces,
     TotalReflections,
@@ -97,6 +99,7 @@ impl Output {
             "ior" => return Self::Ior,
             "dior_dlambda" => return Self::IorByLambda,
             "abbe_number" => return Self::AbbeNumber,
+            INTERNAL_TRANSMITTANCE => return Self::InternalTransmittance,
             "interfaces" => return Self::Interfaces,
             "rough_interfaces" => return Self::RoughInterfaces,
             "total_reflections" => return Self::TotalReflections,
@@ -121,6 +124,8 @@ struct Prepared<'a> {
     /// At the wavelengths of the R, G, B responses; empty unless a layer asks for it.
     channel_media: Vec<Media>,
     outputs: Vec<Output>,
+    /// Of every medium at the wavelengths of the R, G, B responses; `None` unless a layer asks for it.
+    absorption: Option<Coefficients<3>>,
     /// Of every material; empty unless a layer asks for it.
     abbe_numbers: Vec<Option<f64>>,
     /// Whether some layer tells about the first surface.
@@ -147,6 +152,7 @@ impl<'a> Prepared<'a> {
             media: media(task.optics.reference)?,
             channel_media: channels.iter().map(|&wavelength| media(wavelength)).collect::<Result<_>>()?,
             outputs: task.aovs.iter().map(|aov| Output::of(aov)).collect(),
+            absorption: task.needs.transmittance.then(|| Coefficients::at(scene, task.optics.channels)),
             abbe_numbers: asked.iter().map(abbe_number).collect::<Result<_>>()?,
             needs_first: task.aovs.iter().any(|aov| aov.family == Family::FirstSurface),
         })
@@ -155,21 +161,11 @@ impl<'a> Prepared<'a> {
 
 impl PreparedIntegrator for Prepared<'_> {
     fn worker(&self) -> Box<dyn Worker + '_> {
-        let counters = Counters::default();
-        let log = Vec::new();
         match self.task.needs.columns {
-            Columns::None => {
-                Box::new(Carrier::<NoColumns> { prepared: self, counters, log, columns: Default::default() })
-            }
-            Columns::Lambda => {
-                Box::new(Carrier::<LambdaColumn> { prepared: self, counters, log, columns: Default::default() })
-            }
-            Columns::Screen => {
-                Box::new(Carrier::<ScreenColumns> { prepared: self, counters, log, columns: Default::default() })
-            }
-            Columns::SecondOrder => {
-                Box::new(Carrier::<SecondOrderColumns> { prepared: self, counters, log, columns: Default::default() })
-            }
+            Columns::None => Box::new(Carrier::<NoColumns>::new(self)),
+            Columns::Lambda => Box::new(Carrier::<LambdaColumn>::new(self)),
+            Columns::Screen => Box::new(Carrier::<ScreenColumns>::new(self)),
+            Columns::SecondOrder => Box::new(Carrier::<SecondOrderColumns>::new(self)),
         }
     }
 }
@@ -179,6 +175,7 @@ struct Carrier<'a, C> {
     prepared: &'a Prepared<'a>,
     counters: Counters,
     log: Vec<Step>,
+    segments: Vec<Segment>,
     columns: std::marker::PhantomData<C>,
 }
 
@@ -196,7 +193,17 @@ impl<C: ColumnSet> Worker for Carrier<'_, C> {
     }
 }
 
-impl<C: ColumnSet> Carrier<'_, C> {
+impl<'a, C: ColumnSet> Carrier<'a, C> {
+    fn new(prepared: &'a Prepared<'a>) -> Self {
+        Self {
+            prepared,
+            counters: Counters::default(),
+            log: Vec::new(),
+            segments: Vec::new(),
+            columns: std::marker::PhantomData,
+        }
+    }
+
     fn sample(&mut self, raster: [f64; 2], out: &mut PixelAccumulator) {
         let Prepared { task, follower, media, .. } = self.prepared;
         let start = task.camera.ray(raster[0], raster[1]);
@@ -209,8 +216,11 @@ impl<C: ColumnSet> Carrier<'_, C> {
             }
             return;
         }
-        let log = task.needs.second_chain.then_some(&mut self.log);
-        let chain = follower.follow::<C>(&start, media, log, &mut self.counters);
+        let record = Record {
+            steps: task.needs.second_chain.then_some(&mut self.log),
+            segments: task.needs.transmittance.then_some(&mut self.segments),
+        };
+        let chain = follower.follow::<C>(&start, media, record, &mut self.counters);
         let sample = Sample { task, chain: &chain, end: EndState::new(&chain) };
         let end_surface = match &chain.end {
             End::Surface(point) => Some(point),
@@ -245,6 +255,12 @@ impl<C: ColumnSet> Carrier<'_, C> {
                 Output::AbbeNumber => {
                     let material = (chain.dielectric_id as usize).checked_sub(1);
                     out.add(layer, scalar(material.and_then(|i| self.prepared.abbe_numbers[i])));
+                }
+                Output::InternalTransmittance => {
+                    // Nothing is looked up where no medium absorbs.
+                    let transmittance = |absorption: &Coefficients<3>| absorption.transmittance(&self.segments);
+                    let value = self.prepared.absorption.as_ref().map_or([1.0; 3], transmittance);
+                    out.add(layer, sample.end.exists().then_some(value));
                 }
                 Output::Interfaces => out.add_first(layer, chain.interfaces),
                 Output::RoughInterfaces => out.add_first(layer, chain.rough_interfaces),
@@ -320,7 +336,7 @@ impl<C: ColumnSet> Carrier<'_, C> {
             return sample.end.exists().then_some(DVec2::ZERO);
         }
         self.counters.retraces += 1;
-        let target = follower.follow::<NoColumns>(start, &channel_media[channel], None, &mut self.counters);
+        let target = follower.follow::<NoColumns>(start, &channel_media[channel], Record::none(), &mut self.counters);
         let seen = EndState::new(&target);
         let delta = task.optics.channels[channel].nanometers() - task.optics.reference.nanometers();
         let mut offset = sample.motion().map_or(DVec2::ZERO, |motion| -motion * delta);
@@ -328,7 +344,7 @@ impl<C: ColumnSet> Carrier<'_, C> {
         for _ in 0..MAX_STEPS {
             let moved = task.camera.ray(raster[0] + offset.x, raster[1] - offset.y);
             self.counters.retraces += 1;
-            let chain = follower.follow::<ScreenColumns>(&moved, media, None, &mut self.counters);
+            let chain = follower.follow::<ScreenColumns>(&moved, media, Record::none(), &mut self.counters);
             if chain.interfaces != target.interfaces || chain.total_reflections != target.total_reflections {
                 return None;
             }

@@ -6,6 +6,7 @@
 
 pub mod chain;
 pub mod differentials;
+pub mod transmittance;
 
 use std::sync::Arc;
 
@@ -14,7 +15,7 @@ use serde::Serialize;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::film::SampleRange;
-use crate::film::aov::{Aov, Family};
+use crate::film::aov::{Aov, Family, INTERNAL_TRANSMITTANCE};
 use crate::film::pixel::PixelAccumulator;
 use crate::sampler::Sampler;
 use crate::scene::view::View;
@@ -46,6 +47,8 @@ pub struct Needs {
     pub second_chain: bool,
     /// Whether chains are traced again at the wavelengths of the R, G, B responses.
     pub retrace: bool,
+    /// Whether the absorption of the media along a chain is summed.
+    pub transmittance: bool,
 }
 
 impl Needs {
@@ -68,6 +71,7 @@ impl Needs {
             columns,
             second_chain: is_dispersive && has(Family::ScreenSecondOrder),
             retrace: is_dispersive && has(Family::Retrace),
+            transmittance: aovs.iter().any(|aov| aov.name == INTERNAL_TRANSMITTANCE),
         }
     }
 }

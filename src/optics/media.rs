@@ -1,8 +1,48 @@
 //! Which medium a ray is in: glass in glass, cemented surfaces, overlapping objects, a camera under water.
 //!
 //! The stack remembers everything that was entered and not left. Where several overlap, the dielectric priority decides
-//! (Schmidt & Budge, "Simple nested dielectrics in ray traced images", JGT 7(2), 2002): the lowest set priority wins, an
-//! unset one is weaker than any set one, and among equals the last entered wins.
+//! (Schmidt & Budge, "Simple nested dielectrics in ray traced images", JGT 7(2), 2002): the strongest [`Priority`] wins,
+//! and among equals the last entered.
+
+/// Which medium wins where several overlap; the stronger one is the greater one.
+///
+/// Renderers number it in both orders. Schmidt & Budge, MoonRay and `abbe:dielectricPriority` let the lower number win,
+/// Arnold the higher one. Both mean "unset" by 0. So that glass of both kinds can meet in one scene, the number n of
+/// the one order counts as −n of the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Priority(Strength);
+
+/// From weak to strong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+enum Strength {
+    /// Weaker than what has no priority: Arnold's negative ones.
+    Below(i32),
+    Unset,
+    /// Larger is stronger. −1 − n for the number n where the lower wins, so that all of `i32` fits.
+    Set(i32),
+}
+
+impl Priority {
+    /// Not authored: weaker than every set one.
+    pub const UNSET: Self = Self(Strength::Unset);
+
+    /// From an order in which the lower number wins; 0 is unset.
+    pub const fn lower_wins(number: i32) -> Self {
+        // !n = −1 − n, which exists for every n.
+        if number == 0 { Self::UNSET } else { Self(Strength::Set(!number)) }
+    }
+
+    /// From an order in which the higher number wins (Arnold's `dielectric_priority`); 0 is unset, negative numbers are
+    /// weaker than that.
+    pub const fn higher_wins(number: i32) -> Self {
+        match number {
+            0 => Self::UNSET,
+            // −1 − (−n) = n − 1.
+            1.. => Self(Strength::Set(number - 1)),
+            _ => Self(Strength::Below(number)),
+        }
+    }
+}
 
 /// Index of a medium in the scene's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -17,15 +57,8 @@ pub struct Inside {
     pub slot: u32,
     /// The medium inside.
     pub medium: MediumId,
-    /// Dielectric priority: lower wins; 0 is unset and weakest.
-    pub priority: i32,
-}
-
-impl Inside {
-    /// Order of strength: the smallest key wins. Unset comes after every set priority.
-    fn rank(&self) -> (bool, i32) {
-        (self.priority == 0, self.priority)
-    }
+    /// Who wins where several overlap.
+    pub priority: Priority,
 }
 
 /// The answer to leaving what was never entered: an open mesh, or normals that point the wrong way.
@@ -54,7 +87,7 @@ impl Default for MediaStack {
 impl MediaStack {
     /// Outside of everything.
     pub const fn new() -> Self {
-        const NOTHING: Inside = Inside { instance: 0, slot: 0, medium: MediumId(0), priority: 0 };
+        const NOTHING: Inside = Inside { instance: 0, slot: 0, medium: MediumId(0), priority: Priority::UNSET };
         Self { inline: [NOTHING; INLINE], len: 0, spill: Vec::new() }
     }
 
@@ -112,6 +145,17 @@ impl MediaStack {
         Ok(strongest(self.entries(), Some(index), None))
     }
 
+    /// Whether a surface that leaves `inside` lies within another medium that was entered later and is just as strong: the
+    /// two objects overlap, neither holds the other, and no priority says whose the overlap is. On the way back it belongs
+    /// to the other one.
+    pub fn is_undecided(&self, inside: &Inside) -> bool {
+        let Some(index) = self.find(inside) else { return false };
+        let entries = self.entries();
+        let left = &entries[index];
+        entries[index + 1..].iter().any(|e| e.priority == left.priority && e.medium != left.medium)
+            && entries.iter().all(|e| e.priority <= left.priority)
+    }
+
     fn find(&self, inside: &Inside) -> Option<usize> {
         let entries = self.entries();
         let same_object = |entry: &Inside| entry.instance == inside.instance && entry.slot == inside.slot;
@@ -124,8 +168,8 @@ fn strongest(entries: &[Inside], left: Option<usize>, entered: Option<&Inside>) 
     let mut winner: Option<&Inside> = None;
     let staying = entries.iter().enumerate().filter(|(index, _)| Some(*index) != left).map(|(_, entry)| entry);
     for entry in staying.chain(entered) {
-        // `<=`: among equals the last entered wins.
-        if winner.is_none_or(|best| entry.rank() <= best.rank()) {
+        // `>=`: among equals the last entered wins.
+        if winner.is_none_or(|best| entry.priority >= best.priority) {
             winner = Some(entry);
         }
     }
@@ -137,7 +181,7 @@ mod tests {
     use super::*;
 
     fn inside(instance: u32, priority: i32) -> Inside {
-        Inside { instance, slot: 0, medium: MediumId(100 + instance), priority }
+        Inside { instance, slot: 0, medium: MediumId(100 + instance), priority: Priority::lower_wins(priority) }
     }
 
     fn medium(instance: u32) -> Option<MediumId> {
@@ -192,6 +236,45 @@ mod tests {
     }
 
     #[test]
+    fn a_number_of_one_order_is_its_negative_of_the_other() {
+        for n in [1, 2, 17, i32::MAX] {
+            assert_eq!(Priority::higher_wins(n), Priority::lower_wins(-n));
+        }
+        assert_eq!(Priority::lower_wins(0), Priority::UNSET);
+        assert_eq!(Priority::higher_wins(0), Priority::UNSET);
+    }
+
+    #[test]
+    fn priorities_are_ordered_by_strength() {
+        let weak_to_strong = [
+            Priority::higher_wins(i32::MIN),
+            Priority::higher_wins(-2),
+            Priority::higher_wins(-1),
+            Priority::UNSET,
+            Priority::lower_wins(i32::MAX),
+            Priority::lower_wins(2),
+            Priority::lower_wins(1),
+            Priority::higher_wins(1),
+            Priority::higher_wins(2),
+            Priority::higher_wins(i32::MAX),
+            Priority::lower_wins(i32::MIN),
+        ];
+        assert!(weak_to_strong.is_sorted_by(|a, b| a < b), "{weak_to_strong:?}");
+    }
+
+    #[test]
+    fn arnolds_priorities_let_the_higher_win_and_the_negative_lose_to_unset() {
+        let glass = |instance, priority| Inside { priority: Priority::higher_wins(priority), ..inside(instance, 0) };
+        let mut stack = MediaStack::new();
+        stack.enter(glass(1, 1));
+        assert_eq!(stack.preview_enter(&glass(2, 2)), medium(2));
+        assert_eq!(stack.preview_enter(&glass(2, 0)), medium(1));
+        let mut stack = MediaStack::new();
+        stack.enter(inside(1, 0));
+        assert_eq!(stack.preview_enter(&glass(2, -1)), medium(1));
+    }
+
+    #[test]
     fn entered_twice_is_left_twice() {
         let mut stack = MediaStack::new();
         stack.enter(inside(1, 0));
@@ -204,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_bubble_modelled_as_a_shell_of_its_glass_leaves_the_glass() {
-        let glass = |instance| Inside { instance, slot: 1, medium: MediumId(7), priority: 0 };
+        let glass = |instance| Inside { instance, slot: 1, medium: MediumId(7), priority: Priority::UNSET };
         let mut stack = MediaStack::new();
         stack.enter(glass(1));
         assert_eq!(stack.preview_leave(&glass(2)), Ok(None));
@@ -218,13 +301,13 @@ mod tests {
     #[test]
     fn slots_of_one_instance_are_apart() {
         let mut stack = MediaStack::new();
-        stack.enter(Inside { instance: 1, slot: 0, medium: MediumId(7), priority: 0 });
-        stack.enter(Inside { instance: 1, slot: 2, medium: MediumId(8), priority: 0 });
+        stack.enter(Inside { instance: 1, slot: 0, medium: MediumId(7), priority: Priority::UNSET });
+        stack.enter(Inside { instance: 1, slot: 2, medium: MediumId(8), priority: Priority::UNSET });
         assert_eq!(
-            stack.preview_leave(&Inside { instance: 1, slot: 1, medium: MediumId(9), priority: 0 }),
+            stack.preview_leave(&Inside { instance: 1, slot: 1, medium: MediumId(9), priority: Priority::UNSET }),
             Err(NotInside)
         );
-        assert!(stack.leave(&Inside { instance: 1, slot: 0, medium: MediumId(7), priority: 0 }));
+        assert!(stack.leave(&Inside { instance: 1, slot: 0, medium: MediumId(7), priority: Priority::UNSET }));
         assert_eq!(stack.current(), Some(MediumId(8)));
     }
 

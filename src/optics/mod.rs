@@ -1,12 +1,15 @@
-//! Refractive indices with their wavelength derivatives, and the media a ray is in.
+//! Refractive indices with their wavelength derivatives, absorption, and the media a ray is in.
 //!
 //! Indices are relative to air, as catalogues state them: outside of every medium n = 1.
 //! An index is an `ior`; `_i` is the side of the incident ray, `_t` the other one. Cosines at an interface are those of the
 //! acute angles (positive) wherever they have a name; in momentum form g = K·N is negative because the normal faces the ray.
 
+pub mod absorption;
+pub mod catalog;
 pub mod dispersion;
 pub mod media;
 
+pub use absorption::{Absorption, Extinction};
 pub use dispersion::Dispersion;
 
 /// A refractive index at one wavelength with its first two derivatives by wavelength.

@@ -8,6 +8,7 @@ pub mod plan;
 pub mod request;
 mod settings;
 pub mod trace;
+mod validity;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -193,6 +194,17 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
             format!(
                 "{} rays left a glass that they had not entered: an open mesh, or normals that point inward",
                 counters.unmatched_exits
+            ),
+        );
+    }
+    if counters.undecided_overlaps > 0 {
+        warnings.warn(
+            "undecided-overlap",
+            &scene.document().stage.source,
+            format!(
+                "{} times a ray left one glass inside of another of the same priority: the objects overlap, and which \
+                 medium fills the overlap depends on where the ray comes from: author abbe:dielectricPriority (lower wins)",
+                counters.undecided_overlaps
             ),
         );
     }

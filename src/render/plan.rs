@@ -8,12 +8,14 @@ use serde::Serialize;
 
 use super::request::Request;
 use super::settings::{self, Attributes};
+use super::validity;
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::film::aov::Aov;
+use crate::film::aov::{Aov, INTERNAL_TRANSMITTANCE};
 use crate::film::{SampleRange, Window};
 use crate::geometry::Shape;
+use crate::integrator::transmittance::absorbs;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
@@ -142,8 +144,11 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let integrator = registry.find(&integrator)?;
     let aovs: Vec<&Aov> = layers.iter().map(|layer| layer.aov).collect();
     let dispersive = dispersive_material(scene, &optics);
-    let needs = integrator.needs(&aovs, dispersive.is_some());
-    let (carried, skipped) = reasons(scene, integrator, &layers, &needs, dispersive, &optics);
+    let absorbing = scene.materials.iter().find(|material| absorbs(material));
+    let mut needs = integrator.needs(&aovs, dispersive.is_some());
+    needs.transmittance &= absorbing.is_some();
+    validity::check(scene, &optics, &needs, &aovs)?;
+    let (carried, skipped) = reasons(scene, integrator, &layers, &needs, [dispersive, absorbing], &optics);
     let seed = match (request.seed, attributes.integer("abbe:seed")?) {
         (Some(seed), _) => seed,
         (None, Some(seed)) => seed as u64,
@@ -196,7 +201,7 @@ fn reasons(
     integrator: &dyn Integrator,
     layers: &[PlannedLayer],
     needs: &Needs,
-    dispersive: Option<&Material>,
+    [dispersive, absorbing]: [Option<&Material>; 2],
     optics: &Optics,
 ) -> (Vec<Decision>, Vec<Decision>) {
     use crate::film::aov::Family;
@@ -256,6 +261,13 @@ fn reasons(
             format!("{} about the first surface only", list(&asked(&[FirstSurface]), "tells", "tell")),
         );
     }
+    let asks = layers.iter().any(|layer| layer.aov.name == INTERNAL_TRANSMITTANCE);
+    let why = match (asks, absorbing) {
+        (false, _) => "no AOV asks for it".to_owned(),
+        (true, None) => format!("no material in use absorbs: {INTERNAL_TRANSMITTANCE} is exactly 1"),
+        (true, Some(material)) => format!("{INTERNAL_TRANSMITTANCE} asks for it, and {} absorbs", material.path),
+    };
+    note(needs.transmittance, "absorption along the chain", why);
     let uv: Vec<_> = layers.iter().map(|layer| layer.aov.name).filter(|name| name.ends_with("uv")).collect();
     let why =
         if uv.is_empty() { "no AOV asks for them".into() } else { format!("{} for them", list(&uv, "asks", "ask")) };

@@ -6,7 +6,8 @@ use serde_json::{Value, json};
 use super::Plan;
 use crate::error::{Error, Result};
 use crate::film::Window;
-use crate::integrator::chain::{Chain, Counters, End, Follower};
+use crate::integrator::chain::{Chain, Counters, End, Follower, Record};
+use crate::integrator::transmittance::{Coefficients, Segment};
 use crate::ray::{Column, ColumnSet, ScatterKind, SecondOrderColumns, Step};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
@@ -38,13 +39,28 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
     let raster = [f64::from(pixel[0]) + dx, f64::from(pixel[1]) + dy];
     let start = camera.ray(raster[0], raster[1]);
     let medium = follower.start_medium(&media);
-    let mut log = Vec::new();
-    let chain: Chain<SecondOrderColumns> = follower.follow(&start, &media, Some(&mut log), &mut Counters::default());
+    let (mut log, mut segments) = (Vec::new(), Vec::new());
+    let record = Record { steps: Some(&mut log), segments: Some(&mut segments) };
+    let chain: Chain<SecondOrderColumns> = follower.follow(&start, &media, record, &mut Counters::default());
+    let absorption = Coefficients::at(scene, [plan.optics.reference]);
 
     let mut columns = SecondOrderColumns::start(&start, &medium);
     let mut point = start.point;
+    // The way from the last event: its medium, length and transmittance, and the transmittance so far. There is one more
+    // segment than steps on a miss, and as many otherwise.
+    let way = |i: usize| {
+        let Segment { medium, length } = segments[i];
+        let [here] = absorption.transmittance(&segments[i..=i]);
+        let [so_far] = absorption.transmittance(&segments[..=i]);
+        json!({
+            "medium": medium.map(|id| &scene.materials[id.0 as usize].path),
+            "length": length.is_finite().then_some(length),
+            "transmittance": here,
+            "transmittance_so_far": so_far,
+        })
+    };
     let mut events = Vec::new();
-    for Step { transfer, scattering } in &log {
+    for (i, Step { transfer, scattering }) in log.iter().enumerate() {
         columns.transfer(transfer);
         point += transfer.distance * transfer.direction;
         let Some(scattering) = scattering else { break };
@@ -57,6 +73,7 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
                 ScatterKind::Mirror => "mirror",
             },
             "distance": transfer.distance,
+            "segment": way(i),
             "position": array(view.origin + point),
             "normal": array(scattering.normal),
             "geometric_normal_used": scattering.geometric_normal_used,
@@ -87,6 +104,7 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
         "camera": array(view.origin),
         "direction": array(start.direction),
         "start_ior": medium.ior,
+        "last_segment": if matches!(chain.end, End::Exhausted) { Value::Null } else { way(segments.len() - 1) },
         "events": events,
         "end": end,
         "last_direction": array(chain.direction),

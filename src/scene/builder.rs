@@ -10,7 +10,7 @@ use glam::{DAffine3, DMat4};
 use rayon::prelude::*;
 
 use super::description::{self, Array, Description, Document, Element, Group, Placement, Target};
-use super::material::{self, Material, ScalarIor};
+use super::material::{self, Context, Material, ScalarIor};
 use super::solids;
 use super::{Counts, Object, Scene};
 use crate::diagnostics::Diagnostics;
@@ -447,9 +447,10 @@ fn build_materials(
     }
     let mut materials = Vec::new();
     let mut ids = vec![0; document.materials.len()];
+    let context = Context { scalar_ior: ScalarIor::default(), meters_per_unit: document.stage.meters_per_unit };
     for (i, authored) in document.materials.iter().enumerate() {
         if used[i] {
-            materials.push(material::compile(authored, ScalarIor::default(), diagnostics)?);
+            materials.push(material::compile(authored, &context, diagnostics)?);
             ids[i] = materials.len() as u32;
         }
     }

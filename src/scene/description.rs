@@ -278,9 +278,13 @@ pub struct Material {
     /// Authored `inputs:abbe:…` of the Material's interface, keyed without `inputs:`.
     #[serde(default)]
     pub interface_abbe: AuthoredMap,
-    /// The surface shader that the chosen terminal leads to.
+    /// The surface shader of the first terminal that leads to one: ours, MaterialX', the universal one, then those of
+    /// other render contexts by name.
     #[serde(default)]
     pub surface: Option<Shader>,
+    /// The surface shaders of the terminals after it, in the same order, each shader once.
+    #[serde(default)]
+    pub alternatives: Vec<Shader>,
 }
 
 /// A surface shader as authored.
@@ -291,7 +295,8 @@ pub struct Shader {
     pub path: String,
     /// `info:id`, for instance `ND_open_pbr_surface_surfaceshader`.
     pub id: String,
-    /// The terminal it was found through: `outputs:abbe:surface`, `outputs:mtlx:surface` or `outputs:surface`.
+    /// The terminal it was found through: `outputs:abbe:surface`, `outputs:mtlx:surface`, `outputs:surface` or another
+    /// render context's, such as `outputs:arnold:surface`.
     pub terminal: String,
     /// Authored constant inputs by name without `inputs:`, connections to constants followed.
     #[serde(default)]

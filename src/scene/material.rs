@@ -4,6 +4,7 @@
 //! each by its own specification (`dialect`); a scalar index, constant unless [`ScalarIor`] says otherwise. Fallbacks
 //! of a schema never decide, only authored values do, and what decided stands in [`Material::chosen`].
 
+mod absorption;
 mod dialect;
 mod law;
 #[cfg(test)]
@@ -12,8 +13,10 @@ mod values;
 
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
+use crate::optics::Absorption;
 use crate::optics::dispersion::Dispersion;
-use crate::scene::description;
+use crate::optics::media::Priority;
+use crate::scene::description::{self, Shader};
 
 use dialect::{Response, Surface};
 use law::Authored;
@@ -49,6 +52,15 @@ impl ScalarIor {
     }
 }
 
+/// What a material cannot say of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Context {
+    /// What becomes of an index without dispersion.
+    pub scalar_ior: ScalarIor,
+    /// Metres in a unit of the stage, positive.
+    pub meters_per_unit: f64,
+}
+
 /// A compiled material.
 #[derive(Clone, Debug)]
 pub struct Material {
@@ -74,8 +86,10 @@ pub enum Kind {
     Dielectric {
         /// The index inside.
         dispersion: Dispersion,
-        /// `abbe:dielectricPriority`: 0 is unset and weakest, otherwise the lower number wins where objects overlap.
-        priority: i32,
+        /// What the inside takes from the light; `None` where it is clear, and of a wall without an inside.
+        absorption: Option<Absorption>,
+        /// Which medium wins where objects overlap.
+        priority: Priority,
         /// Rougher than [`SMOOTH_ROUGHNESS`].
         rough: bool,
         /// A wall without an inside: the ray goes straight through.
@@ -90,50 +104,55 @@ pub enum Kind {
 }
 
 /// Compiles what was authored. Errors name the prim and attribute, and what to author instead.
-pub fn compile(
-    material: &description::Material,
-    scalar_ior: ScalarIor,
-    diagnostics: &mut Diagnostics,
-) -> Result<Material> {
-    let (kind, chosen) = classify(material, scalar_ior, diagnostics)?;
+pub fn compile(material: &description::Material, context: &Context, diagnostics: &mut Diagnostics) -> Result<Material> {
+    let (kind, chosen) = classify(material, context, diagnostics)?;
     Ok(Material { path: material.path.clone(), kind, chosen })
 }
 
 fn classify(
     material: &description::Material,
-    scalar_ior: ScalarIor,
+    context: &Context,
     diagnostics: &mut Diagnostics,
 ) -> Result<(Kind, String)> {
+    let terminals: Vec<&Shader> = material.surface.iter().chain(&material.alternatives).collect();
+    let surface = terminals.iter().find_map(|shader| Surface::of(shader));
+
     let mut places = vec![Values::new(&material.abbe, &material.path, "")];
-    if let Some(shader) = &material.surface {
+    if let Some(shader) = surface.as_ref().map(Surface::shader).or(material.surface.as_ref()) {
         places.push(Values::new(&shader.abbe, &shader.path, "inputs:"));
     }
     places.push(Values::new(&material.interface_abbe, &material.path, "inputs:"));
     let authored = Authored::new(places);
     authored.warn_of_unread(diagnostics);
 
-    let Some(shader) = &material.surface else {
-        warn_of_idle_law(material, &authored, "it has no surface shader", diagnostics)?;
-        return Ok((Kind::Opaque, "opaque: no surface shader".to_owned()));
+    let Some(surface) = surface else {
+        let reason = match terminals[..] {
+            [] => "no surface shader".to_owned(),
+            _ => warn_of_unknown(&terminals, diagnostics),
+        };
+        warn_of_idle_law(material, &authored, &reason, diagnostics)?;
+        return Ok((Kind::Opaque, format!("opaque: {reason}")));
     };
-    let Some(surface) = Surface::of(shader) else {
-        diagnostics.warn(
-            "unsupported-shader",
-            format!("<{}>", shader.path),
-            format!("shader '{}' is not understood: its surfaces are opaque", shader.id),
-        );
-        return Ok((Kind::Opaque, format!("opaque: shader '{}' is not understood", shader.id)));
-    };
-    surface.warn_of_unread(diagnostics)?;
-
     let (kind, reason) = match surface.response(diagnostics)? {
         Response::Transmissive { why, rough, thin_walled } => {
-            let (dispersion, source) = dispersion(&surface, shader, &authored, scalar_ior, diagnostics)?;
+            let (dispersion, source) =
+                dispersion(&surface, surface.shader(), &authored, context.scalar_ior, diagnostics)?;
             let wall = if thin_walled { "thin-walled dielectric, followed straight through" } else { "dielectric" };
             let lobe = if rough { ", rough" } else { "" };
-            let priority = authored.priority()?;
-            let chosen = format!("{wall} ({why}{lobe}): {source}");
-            return Ok((Kind::Dielectric { dispersion, priority, rough, thin_walled }, chosen));
+            let (absorption, fades) =
+                match absorption::absorption(&surface, &authored, thin_walled, context, diagnostics)? {
+                    Some((absorption, place)) => {
+                        let fades = format!("; {} from {place}", absorption.describe());
+                        (Some(absorption), fades)
+                    }
+                    None => (None, String::new()),
+                };
+            let (priority, rank) = match authored.priority()?.or(surface.priority()?) {
+                Some((priority, source)) => (priority, format!("; priority {source}")),
+                None => (Priority::UNSET, String::new()),
+            };
+            let chosen = format!("{wall} ({why}{lobe}): {source}{fades}{rank}");
+            (Kind::Dielectric { dispersion, absorption, priority, rough, thin_walled }, chosen)
         }
         Response::Metal { why, rough: false } => (Kind::Mirror, format!("mirror: {why}, smooth")),
         Response::Metal { why, rough: true } => {
@@ -142,8 +161,32 @@ fn classify(
         Response::CutOut(why) => (Kind::PassThrough, format!("cut out: {why}")),
         Response::Opaque(why) => (Kind::Opaque, format!("opaque: {why}")),
     };
-    warn_of_idle_law(material, &authored, &reason, diagnostics)?;
-    Ok((kind, reason))
+    if !matches!(kind, Kind::Dielectric { .. }) {
+        warn_of_idle_law(material, &authored, &reason, diagnostics)?;
+    }
+    Ok((kind, format!("{reason}{}", passed_over(&terminals, surface.shader()))))
+}
+
+/// Says that none of the terminals leads to a shader that is understood; returns it for the plan.
+fn warn_of_unknown(terminals: &[&Shader], diagnostics: &mut Diagnostics) -> String {
+    for shader in terminals {
+        diagnostics.warn(
+            "unsupported-shader",
+            format!("<{}>", shader.path),
+            format!("shader '{}' is not understood: its surfaces are opaque", shader.id),
+        );
+    }
+    let ids: Vec<_> = terminals.iter().map(|shader| format!("'{}'", shader.id)).collect();
+    format!("shader {} is not understood", ids.join(", "))
+}
+
+/// For the plan: the terminal of `used`, where others came before it.
+fn passed_over(terminals: &[&Shader], used: &Shader) -> String {
+    let others: Vec<_> = terminals.iter().take_while(|s| !std::ptr::eq(**s, used)).map(|s| s.id.as_str()).collect();
+    match others[..] {
+        [] => String::new(),
+        _ => format!(" [{} through {}, since {} is not understood]", used.id, used.terminal, others.join(", ")),
+    }
 }
 
 /// The index of a transmissive surface and where it comes from.

@@ -91,16 +91,19 @@ impl<'a> View<'a> {
         });
         crossings.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.instance.cmp(&b.2.instance)).then(a.1.cmp(&b.1)));
         // Going outwards, an entry must be left again before an exit counts as ours.
-        let mut open: Vec<(u32, u32)> = Vec::new();
+        let mut open: Vec<Inside> = Vec::new();
         let mut around = Vec::new();
         for (_, leaving, inside) in crossings {
-            let key = (inside.instance, inside.slot);
             if !leaving {
-                open.push(key);
-            } else if let Some(i) = open.iter().rposition(|&k| k == key) {
-                open.remove(i);
-            } else {
-                around.push(inside);
+                open.push(inside);
+                continue;
+            }
+            // What is left here is what the stack would leave: a bubble that is a shell of the glass around it is no glass.
+            let same_object = |entry: &Inside| entry.instance == inside.instance && entry.slot == inside.slot;
+            let same_medium = |entry: &Inside| entry.medium == inside.medium;
+            match open.iter().rposition(same_object).or_else(|| open.iter().rposition(same_medium)) {
+                Some(i) => drop(open.remove(i)),
+                None => around.push(inside),
             }
         }
         around.into_iter().rev().for_each(|inside| stack.enter(inside));

@@ -1,9 +1,11 @@
-//! Wavelengths, spectral lines, responses.
+//! Wavelengths, spectral lines, responses, an illuminant, colours made spectra.
 //!
 //! A wavelength is a [`Wavelength`], never a bare number: nanometres inside, micrometres for the dispersion laws.
 
+pub mod illuminant;
 pub mod lines;
 pub mod response;
+pub mod uplift;
 mod wavelength;
 
 pub use wavelength::Wavelength;

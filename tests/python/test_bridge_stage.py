@@ -572,12 +572,14 @@ def test_a_stage_in_memory_is_never_changed():
 # Composition
 
 
-def test_what_does_not_compose_is_named_or_refused(capfd):
+def test_what_does_not_compose_is_named_or_refused(capfd, monkeypatch):
+    monkeypatch.setitem(sys.modules, "MaterialX", None)
     description = read("missing.usda")
     warnings = warned(description, "missing-reference")
     assert [warning["places"] for warning in warnings] == [["</Layer>"], ["</MaterialX>"], ["</Prim>"]]
     assert "not_here.usda" in warnings[0]["message"]
     assert "glass.mtlx@ is a MaterialX document" in warnings[1]["message"]
+    assert "pip install 'abbe[mtlx]'" in warnings[1]["message"]
     assert capfd.readouterr().err == "", "USD's own warnings are ours to show"
     with pytest.raises(StageError, match=r"^</Layer>: .*not_here\.usda.*choose --missing warn"):
         describe(STAGES / "missing.usda", missing="error")

@@ -1,4 +1,4 @@
-"""The schema plug-in: found in both ways, exactly as documented, reproduced by its generator."""
+"""The plug-in's files: schemas found in both ways, exactly as documented; the shader as the schema; reproduced."""
 
 import importlib.util
 import json
@@ -8,6 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
+
+pytest.importorskip("pxr.Usd", reason="the plug-in is USD's")
+
+from pxr import Sdf
 
 ROOT = Path(__file__).resolve().parents[2]
 PLUGIN = ROOT / "plugin"
@@ -98,6 +102,7 @@ for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeRenderSettingsAPI"
             list(value) if hasattr(value, "__len__") and not isinstance(value, str) else value,
             None if tokens is None else list(tokens))
         assert definition.GetPropertyDocumentation(key), key
+        assert attribute.GetMetadata("displayName") and attribute.GetMetadata("displayGroup"), key
     assert definition.GetDocumentation()
     assert prim.CanApplyAPI(name) and prim.ApplyAPI(name) and prim.HasAPI(name)
     assert not wrong.CanApplyAPI(name)
@@ -149,5 +154,42 @@ def test_generator_reproduces_the_committed_files(tmp_path: Path) -> None:
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
     module.generate(tmp_path)
-    for name in ("plugInfo.json", "generatedSchema.usda"):
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(module.FILES)
+    for name in module.FILES:
         assert (tmp_path / name).read_bytes() == (PLUGIN / name).read_bytes(), f"{name}: run python plugin/generate.py"
+
+
+# What AbbeGlass has beside the attributes of AbbeDispersionAPI.
+GLASS_INPUTS = {
+    "inputs:ior": ("float", 1.5168),
+    "inputs:abbe_number": ("float", 64.17),
+    "inputs:roughness": ("float", 0.0),
+    "inputs:thin_walled": ("bool", False),
+    "inputs:transmission_color": ("color3f", [1.0, 1.0, 1.0]),
+    "inputs:transmission_depth": ("float", 0.0),
+}
+
+
+def test_the_shader_has_the_attributes_of_the_schema() -> None:
+    layer = Sdf.Layer.FindOrOpen(str(PLUGIN / "AbbeGlass.usda"))
+    shader = layer.GetPrimAtPath("/AbbeGlass")
+    inputs = {item.name: item for item in shader.properties if item.name.startswith("inputs:")}
+    schema = SCHEMAS["AbbeDispersionAPI"][1]
+    assert list(inputs) == [*GLASS_INPUTS, *(f"inputs:{name}" for name in schema)]
+    for name, item in inputs.items():
+        value = item.default
+        value = list(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
+        tokens = item.GetInfo("allowedTokens")
+        if name in GLASS_INPUTS:
+            kind, fallback = GLASS_INPUTS[name]
+            assert str(item.typeName) == kind and value == pytest.approx(fallback, rel=2.0**-24), name
+        else:
+            kind, _, fallback, allowed = schema[name.removeprefix("inputs:")]
+            assert (str(item.typeName), value, list(tokens) if tokens else None) == (kind, fallback, allowed), name
+        metadata = item.GetInfo("sdrMetadata")
+        assert metadata["help"] == item.documentation and metadata["label"] == item.displayName
+        assert metadata["page"] == item.displayGroup
+        # Every token that Sdr can offer.
+        assert metadata.get("options", "").split("|") == [token for token in tokens or [""] if token or not tokens]
+    assert shader.attributes["info:id"].default == "AbbeGlass"
+    assert [item.name for item in shader.properties if item.name.startswith("outputs:")] == ["outputs:surface"]

@@ -68,18 +68,14 @@ impl Stagehand {
                 connected: BTreeMap::new(),
                 abbe: BTreeMap::new(),
             }),
+            alternatives: Vec::new(),
         });
         self.document.materials.len() - 1
     }
 
     pub fn glass(&mut self, path: &str, law: ([f64; 3], [f64; 3])) -> usize {
-        self.surface(
+        self.authored_glass(
             path,
-            "ND_open_pbr_surface_surfaceshader",
-            &[
-                ("transmission_weight", authored("float", json!(1.0))),
-                ("specular_roughness", authored("float", json!(0.0))),
-            ],
             &[
                 ("abbe:dispersion:sellmeier:b", authored("double[]", json!(law.0))),
                 ("abbe:dispersion:sellmeier:c", authored("double[]", json!(law.1))),
@@ -91,6 +87,19 @@ impl Stagehand {
         let index = self.glass(path, law);
         self.document.materials[index].abbe.insert("abbe:dielectricPriority".into(), authored("int", json!(priority)));
         index
+    }
+
+    /// Clear with these attributes of ours.
+    pub fn authored_glass(&mut self, path: &str, abbe: &[(&str, Authored)]) -> usize {
+        self.surface(
+            path,
+            "ND_open_pbr_surface_surfaceshader",
+            &[
+                ("transmission_weight", authored("float", json!(1.0))),
+                ("specular_roughness", authored("float", json!(0.0))),
+            ],
+            abbe,
+        )
     }
 
     pub fn constant_glass(&mut self, path: &str, ior: f64) -> usize {
@@ -113,6 +122,13 @@ impl Stagehand {
     pub fn sphere(&mut self, path: &str, radius: f64, transform: DMat4, material: Option<usize>) {
         self.document.shapes.push(Shape::Sphere { path: path.into(), radius });
         self.place(path, transform, material);
+    }
+
+    /// A shape that needs no arrays.
+    pub fn solid(&mut self, shape: Shape, transform: DMat4, material: Option<usize>) {
+        let path = shape.path().to_owned();
+        self.document.shapes.push(shape);
+        self.place(&path, transform, material);
     }
 
     /// A polygon mesh, right-handed: counter-clockwise from outside.

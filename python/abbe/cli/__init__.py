@@ -6,7 +6,7 @@
 | 1 | failed |
 | 2 | the command line is not understood, or contradicts the stage |
 | 3 | a part of the output was written |
-| 4 | ``abbe check`` found a fault |
+| 4 | ``abbe check`` or ``abbe validate`` found a fault |
 | 130, 143 | interrupted by Ctrl-C or SIGTERM |
 """
 
@@ -36,13 +36,28 @@ from . import (
     render,
     settings,
     trace,
+    validate,
 )
 
 __all__ = ["main"]
 
 FAILED, USAGE, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 
-_COMMANDS = (render, plan, export, aovs, list_cameras, settings, trace, check, merge, bench, doctor, plugin_path)
+_COMMANDS = (
+    render,
+    plan,
+    export,
+    aovs,
+    list_cameras,
+    settings,
+    trace,
+    check,
+    validate,
+    merge,
+    bench,
+    doctor,
+    plugin_path,
+)
 
 
 class _Parser(argparse.ArgumentParser):

@@ -53,6 +53,13 @@ def _print_columns(columns: Mapping[str, Any], indent: str) -> None:
             print(f"{indent}{symbol:3} p {_vector(column['point'])}  K {_vector(column['momentum'])}")
 
 
+def _print_segment(segment: Mapping[str, Any]) -> None:
+    """The way to an event: what it ran through, and what was left of the light at the reference wavelength."""
+    length = "without end" if segment["length"] is None else _number(segment["length"])
+    here, so_far = _number(segment["transmittance"]), _number(segment["transmittance_so_far"])
+    print(f"      through {segment['medium'] or 'air'}, {length}: transmittance {here}, so far {so_far}")
+
+
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     scene = options.open_scene(args, options.frame(args))
@@ -68,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
         before, after = event["ior"]
         name, distance = _event_name(event["event"]), _number(event["distance"])
         print(f"{number:3} {name} at {_vector(event['position'])} after {distance}")
+        _print_segment(event["segment"])
         print(f"      normal {_vector(event['normal'])}{' (geometric)' if event['geometric_normal_used'] else ''}")
         print(f"      ior {before:.9g} to {after:.9g}, W² {_number(event['w_squared'])}")
         _print_columns(event["columns"]["leaving"], "      ")
@@ -77,6 +85,8 @@ def run(args: argparse.Namespace) -> int:
     else:
         where = end["kind"]
     print(f"end {where}")
+    if told["last_segment"] is not None:
+        _print_segment(told["last_segment"])
     print(f"      direction {_vector(told['last_direction'])}")
     _print_columns(told["columns"], "      ")
     print(f"      {told['interfaces']} interfaces, {told['total_reflections']} total reflections")

@@ -1,18 +1,21 @@
 """Materials: which one each prim is bound to, and what stands on it; what it means for optics the core decides.
 
-Only bound materials are read. A value counts as authored where a layer holds it; declared inputs without a value mean
-the shader's own default and are left out.
+Only bound materials are read, and of each the surface shader of every render context. A value counts as authored where
+a layer holds it; declared inputs without a value mean the shader's own default and are left out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cache
+from pathlib import PurePosixPath
 from typing import Any
 
 from . import tokens
-from ._pxr import Usd, UsdShade
+from ._pxr import Usd, UsdGeom, UsdShade
 from .description import Diagnostics
-from .values import authored, authored_namespace, place
+from .folding import Driver, Network, terminal_shader
+from .values import authored_namespace, place, plain
 
 __all__ = ["MaterialReader", "warn_unknown_names"]
 
@@ -36,17 +39,22 @@ class MaterialReader:
         self._diagnostics = diagnostics
         self._purpose = purpose
         self._index_by_prim: dict[Any, int] = {}
+        self._users: list[list[Any]] = []
         self.materials: list[dict[str, Any]] = []
 
     def bound(self, prims: list[Any]) -> list[int | None]:
-        """Return for each prim the index of its material: the binding's purpose first, then the all-purpose one."""
+        """Return for each prim the index of its material: the binding's purpose first, then the all-purpose one.
+
+        All prims of a stage come at once: what a material says may depend on all of its geometry.
+        """
         if not prims:
             return []
         materials, relationships = UsdShade.MaterialBindingAPI.ComputeBoundMaterials(prims, self._purpose)
         result: list[int | None] = []
+        found: list[Any] = []
         for prim, material, relationship in zip(prims, materials, relationships, strict=True):
             if material:
-                result.append(self._index(material.GetPrim()))
+                result.append(self._index(material.GetPrim(), prim, found))
                 continue
             if relationship:
                 targets = ", ".join(f"<{target}>" for target in relationship.GetTargets())
@@ -56,113 +64,121 @@ class MaterialReader:
                     f"is bound to {targets or 'nothing'}, which is no material on the stage",
                 )
             result.append(None)
+        for prim, users in zip(found, self._users, strict=True):
+            self.materials.append(self._read(prim, users))
         return result
 
-    def _index(self, prim: Any) -> int:
+    def unbound(self, prim: Any) -> dict[str, Any]:
+        """Return a Material prim as the description has it, without regard to what is bound to it."""
+        return self._read(prim, [])
+
+    def _index(self, prim: Any, user: Any, found: list[Any]) -> int:
         key = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         index = self._index_by_prim.get(key)
         if index is None:
-            index = self._index_by_prim[key] = len(self.materials)
-            self.materials.append(self._read(prim))
+            index = self._index_by_prim[key] = len(found)
+            found.append(prim)
+            self._users.append([])
+        self._users[index].append(user)
         return index
 
-    def _read(self, prim: Any) -> dict[str, Any]:
+    def _read(self, prim: Any, users: list[Any]) -> dict[str, Any]:
+        network = Network(self._time, self._diagnostics, cache(lambda name: _has_primvar(users, name)))
+        interface, _ = self._inputs(network, prim, tokens.INPUTS_PREFIX + tokens.ABBE_PREFIX)
         material: dict[str, Any] = {
             "path": str(prim.GetPath()),
             "abbe": authored_namespace(prim, tokens.ABBE, self._time),
-            "interface_abbe": {},
+            "interface_abbe": interface,
         }
-        interface, _ = self._inputs(prim, tokens.INPUTS_PREFIX + tokens.ABBE_PREFIX)
-        material["interface_abbe"] = interface
-        surface = self._surface(prim)
-        if surface is None:
-            self._diagnostics.warn("material-without-surface", place(prim), "the material has no surface shader")
-        else:
-            material["surface"] = surface
-            self._check_names(surface["path"], surface["abbe"], tokens.INPUTS_PREFIX)
         self._check_names(material["path"], material["abbe"])
         self._check_names(material["path"], interface, tokens.INPUTS_PREFIX)
+        shaders = [self._shader(network, shader, name) for shader, name in self._surfaces(prim).items()]
+        for shader in shaders:
+            self._check_names(shader["path"], shader["abbe"], tokens.INPUTS_PREFIX)
+        if shaders:
+            material["surface"], *material["alternatives"] = shaders
+        else:
+            self._diagnostics.warn("material-without-surface", place(prim), "the material has no surface shader")
         return material
 
     def _check_names(self, path: str, names: Iterable[str], prefix: str = "") -> None:
         warn_unknown_names(path, names, tokens.MATERIAL_NAMES, self._diagnostics, prefix=prefix)
 
-    def _surface(self, prim: Any) -> dict[str, Any] | None:
-        """Return the surface shader of the first render context that leads to one."""
-        material = UsdShade.Material(prim)
-        others = sorted(output.GetFullName() for output in material.GetSurfaceOutputs())
+    def _surfaces(self, prim: Any) -> dict[Any, str]:
+        """Return the surface shaders and the terminals they were found through, in the order of the terminals."""
+        others = sorted(output.GetFullName() for output in UsdShade.Material(prim).GetSurfaceOutputs())
+        shaders: dict[Any, str] = {}
         for name in dict.fromkeys([*tokens.SURFACE_OUTPUTS, *others]):
             attribute = prim.GetAttribute(name)
             if not attribute or not attribute.HasAuthoredConnections():
                 continue
-            for source in UsdShade.Utils.GetValueProducingAttributes(UsdShade.Output(attribute), True):
-                shader = UsdShade.Shader(source.GetPrim())
-                if shader:
-                    return self._shader(shader, name)
-            self._diagnostics.warn(
-                "dangling-connection", f"{place(prim)}.{name}", "the connection leads to no shader; it is ignored"
-            )
-        return None
+            shader = terminal_shader(attribute)
+            if shader:
+                shaders.setdefault(shader, name)
+            else:
+                self._diagnostics.warn(
+                    "dangling-connection", f"{place(prim)}.{name}", "the connection leads to no shader; it is ignored"
+                )
+        return shaders
 
-    def _shader(self, shader: Any, terminal: str) -> dict[str, Any]:
-        prim = shader.GetPrim()
-        inputs, connected = self._inputs(prim, tokens.INPUTS_PREFIX)
+    def _shader(self, network: Network, prim: Any, terminal: str) -> dict[str, Any]:
+        inputs, connected = self._inputs(network, prim, tokens.INPUTS_PREFIX)
         ours = {name: value for name, value in inputs.items() if name.startswith(tokens.ABBE_PREFIX)}
         return {
             "path": str(prim.GetPath()),
-            "id": self._identifier(shader),
+            "id": _identifier(prim, terminal),
             "terminal": terminal,
             "inputs": {name: value for name, value in inputs.items() if name not in ours},
             "connected": connected,
             "abbe": ours,
         }
 
-    def _identifier(self, shader: Any) -> str:
-        """Return ``info:id``; for code kept in a file (MDL, OSL) the name of the node in it."""
-        identifier = shader.GetShaderId()
-        if identifier:
-            return str(identifier)
-        for item in shader.GetPrim().GetAuthoredPropertiesInNamespace("info"):
-            if item.GetName().endswith(":sourceAsset:subIdentifier"):
-                return str(item.Get() or "")
-        return ""
-
-    def _inputs(self, prim: Any, prefix: str) -> tuple[dict[str, Any], dict[str, str]]:
+    def _inputs(self, network: Network, prim: Any, prefix: str) -> tuple[dict[str, Any], dict[str, str]]:
         """Return the constant inputs whose names begin with ``prefix``, and the outputs that drive the others."""
         constants: dict[str, Any] = {}
         connected: dict[str, str] = {}
         for item in prim.GetAuthoredPropertiesInNamespace(prefix.rstrip(":")):
             if not isinstance(item, Usd.Attribute):
                 continue
+            value = network.value(item)
+            if value is None:
+                continue
             name = item.GetName()[len(tokens.INPUTS_PREFIX) :]
-            source = item
-            if item.HasAuthoredConnections():
-                sources = UsdShade.Utils.GetValueProducingAttributes(UsdShade.Input(item))
-                if not sources:
-                    self._diagnostics.warn(
-                        "dangling-connection",
-                        f"{place(prim)}.{item.GetName()}",
-                        "the connection leads to no value; it is ignored",
-                    )
-                else:
-                    source = self._constant_of(sources[0])
-                    if source is None:
-                        connected[name] = str(sources[0].GetPath())
-                        continue
-            value = authored(source, self._time)
-            if value is not None:
-                constants[name] = value
+            if isinstance(value, Driver):
+                connected[name] = value.path
+                continue
+            data = plain(value.data)
+            if data is not None:
+                constants[name] = {"type": value.type, "value": data}
         return constants, connected
 
-    def _constant_of(self, source: Any) -> Any:
-        """Return the attribute that holds the value of ``source``; None if a shading node computes it."""
-        if not source.GetName().startswith(tokens.OUTPUTS_PREFIX):
-            return source
-        node = UsdShade.Shader(source.GetPrim())
-        if not node or not str(node.GetShaderId() or "").startswith(tokens.CONSTANT_NODE_PREFIX):
-            return None
-        value = node.GetInput(tokens.CONSTANT_NODE_INPUT)
-        if not value:
-            return None
-        sources = UsdShade.Utils.GetValueProducingAttributes(value)
-        return sources[0] if sources and not sources[0].GetName().startswith(tokens.OUTPUTS_PREFIX) else None
+
+def _has_primvar(prims: Iterable[Any], name: str) -> bool:
+    """Return whether one of the prims, or the mesh that one is a subset of, has or inherits a primvar."""
+    for prim in prims:
+        geometry = prim.GetParent() if prim.GetTypeName() == tokens.GEOM_SUBSET else prim
+        primvar = UsdGeom.PrimvarsAPI(geometry).FindPrimvarWithInheritance(name)
+        if primvar and primvar.HasAuthoredValue():
+            return True
+    return False
+
+
+def _identifier(prim: Any, terminal: str) -> str:
+    """Return ``info:id``; for code kept in a file (MDL, OSL) the name of the node in it, or that of the file.
+
+    Of several source types that of the terminal's render context counts.
+    """
+    identifier = UsdShade.Shader(prim).GetShaderId()
+    if identifier:
+        return str(identifier)
+    names: dict[str, str] = {}
+    for item in prim.GetAuthoredPropertiesInNamespace(tokens.INFO):
+        _, source_type, *rest = item.GetName().split(":")
+        value = item.Get() if isinstance(item, Usd.Attribute) else None
+        if rest == [tokens.SOURCE_ASSET, tokens.SUB_IDENTIFIER] and value:
+            # A function of MDL may come with its module and with the types of its parameters.
+            names[source_type] = str(value).partition("(")[0].rpartition("::")[2]
+        elif rest == [tokens.SOURCE_ASSET] and value and value.path:
+            names.setdefault(source_type, PurePosixPath(value.path.replace("\\", "/")).stem)
+    context = terminal.split(":")[1]
+    return names.get(context) or next((names[key] for key in sorted(names)), "")

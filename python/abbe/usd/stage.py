@@ -18,6 +18,8 @@ from ..errors import NotUsdError, StageError, UsageError
 from . import tokens
 from ._pxr import Ar, Pcp, Sdf, Tf, Usd, UsdUtils
 from .description import Diagnostics
+from .mtlx import DocumentError, read_document
+from .substitution import plain_names, substitute
 from .values import place
 
 __all__ = [
@@ -42,7 +44,11 @@ class OpenedStage:
     stage: Any
     source: str
     """The root layer as the user named it."""
+    session: Any = None
+    """Our session layer; None while the stage is the caller's own."""
     keep: list[Any] = field(default_factory=list)
+    documents: dict[str, Any] = field(default_factory=dict)
+    """MaterialX documents by asset identifier: the layer that stands for it, or why there is none."""
 
 
 def source_name(stage_or_path: Any) -> str:
@@ -129,7 +135,17 @@ def open_stage(
         The file is no stage, or an override names what is not there.
     """
     if isinstance(stage_or_path, Usd.Stage):
-        return _from_memory(stage_or_path, variants, overrides, search_paths)
+        opened = _from_memory(stage_or_path, search_paths)
+    else:
+        opened = _from_file(stage_or_path, search_paths, diagnostics)
+    bring_in_documents(opened, diagnostics)
+    _apply(opened, variants, overrides, diagnostics)
+    return opened
+
+
+def _from_file(
+    stage_or_path: Any, search_paths: Sequence[str | os.PathLike[str]], diagnostics: Diagnostics
+) -> OpenedStage:
     try:
         path = os.fspath(stage_or_path)
     except TypeError:
@@ -142,9 +158,7 @@ def open_stage(
     root = _root_layer(path, context)
     session = _session_layer()
     stage = _compose(lambda: Usd.Stage.Open(root, session, context), path)
-    opened = OpenedStage(stage, path, [root, session])
-    _apply(opened, session, variants, overrides)
-    return opened
+    return OpenedStage(stage, path, session, [root])
 
 
 def _session_layer() -> Any:
@@ -203,42 +217,87 @@ def _compose(open_it: Any, source: str) -> Any:
     return stage
 
 
-def _from_memory(
-    stage: Any, variants: Sequence[str], overrides: Overrides, search_paths: Sequence[str | os.PathLike[str]]
-) -> OpenedStage:
-    """Return the caller's stage itself, or, where something is overridden, a second stage on the same layers."""
-    root = stage.GetRootLayer()
-    source = source_name(stage)
+def _from_memory(stage: Any, search_paths: Sequence[str | os.PathLike[str]]) -> OpenedStage:
     if search_paths:
         raise UsageError("search_paths: a stage in memory is composed already: open it with them, or give its path")
-    if not variants and not overrides:
-        return OpenedStage(stage, source)
-    session = _session_layer()
-    theirs = stage.GetSessionLayer()
+    return OpenedStage(stage, source_name(stage))
+
+
+def _own(opened: OpenedStage) -> None:
+    """Replace the caller's own stage by a second one on the same layers, with a session layer of ours."""
+    if opened.session is not None:
+        return
+    theirs = opened.stage.GetSessionLayer()
+    opened.session = _session_layer()
     if theirs:
         # Stage metadata is read from the session's root layer alone.
-        UsdUtils.CopyLayerMetadata(theirs, session, True)
-        session.subLayerPaths = [theirs.identifier]
-    context = stage.GetPathResolverContext()
-    mask = stage.GetPopulationMask()
-    # Payloads are loaded only once the rules are those of the caller's stage.
-    second = _compose(lambda: Usd.Stage.OpenMasked(root, session, context, mask, Usd.Stage.LoadNone), source)
-    second.MuteAndUnmuteLayers(stage.GetMutedLayers(), [])
-    second.SetLoadRules(stage.GetLoadRules())
-    second.SetInterpolationType(stage.GetInterpolationType())
-    opened = OpenedStage(second, source, [stage, root, theirs, session])
-    _apply(opened, session, variants, overrides)
-    return opened
+        UsdUtils.CopyLayerMetadata(theirs, opened.session, True)
+        opened.session.subLayerPaths = [theirs.identifier]
+    opened.keep += [opened.stage, opened.stage.GetRootLayer(), theirs]
+    _recompose(opened, opened.stage.GetRootLayer())
 
 
-def _apply(opened: OpenedStage, session: Any, variants: Sequence[str], overrides: Overrides) -> None:
+def _recompose(opened: OpenedStage, root: Any) -> None:
+    """Compose anew from ``root`` and our session layer, with all else as the stage has it."""
+    old = opened.stage
+    context = old.GetPathResolverContext()
+    mask = old.GetPopulationMask()
+    # Payloads are loaded only once the rules are those of the other stage.
+    stage = _compose(
+        lambda: Usd.Stage.OpenMasked(root, opened.session, context, mask, Usd.Stage.LoadNone), opened.source
+    )
+    stage.MuteAndUnmuteLayers(old.GetMutedLayers(), [])
+    stage.SetLoadRules(old.GetLoadRules())
+    stage.SetInterpolationType(old.GetInterpolationType())
+    opened.stage = stage
+
+
+def bring_in_documents(opened: OpenedStage, diagnostics: Diagnostics) -> None:
+    """Bring the MaterialX documents that the stage refers to onto it, where USD itself does not read them."""
+    if Sdf.FileFormat.FindByExtension(tokens.MATERIALX_EXTENSION):
+        return
+    while True:
+        named = {document_name(str(error)) for error in _composition_errors(opened.stage)}
+        wanted = sorted(name for name in named if name is not None and name not in opened.documents)
+        if not wanted:
+            return
+        with Ar.ResolverContextBinder(opened.stage.GetPathResolverContext()):
+            for identifier in wanted:
+                if not Ar.GetResolver().Resolve(identifier):
+                    opened.documents[identifier] = None
+                    continue
+                try:
+                    opened.documents[identifier] = read_document(identifier, diagnostics)
+                except DocumentError as error:
+                    opened.documents[identifier] = str(error)
+            layers = {name: opened.documents[name] for name in wanted if isinstance(opened.documents[name], Sdf.Layer)}
+            if not layers:
+                return
+            _own(opened)
+            root, copies = substitute(opened.stage, opened.session, layers)
+        opened.keep += copies
+        _recompose(opened, root)
+
+
+def document_name(text: str) -> str | None:
+    """Return the identifier of the MaterialX document that a composition error is about, None if about none."""
+    named = _ASSET.search(text)
+    identifier = named[1].partition(_FORMAT_ARGUMENTS)[0] if named else ""
+    return identifier if identifier.lower().endswith(f".{tokens.MATERIALX_EXTENSION}") else None
+
+
+def _apply(opened: OpenedStage, variants: Sequence[str], overrides: Overrides, diagnostics: Diagnostics) -> None:
     if isinstance(variants, str) or isinstance(overrides, str):
         raise UsageError("variants, overrides: are lists, not one string: put brackets around it")
     if not variants and not overrides:
         return
-    with Usd.EditContext(opened.stage, Usd.EditTarget(session)):
-        for text in variants:
-            _select_variant(opened, text)
+    _own(opened)
+    if variants:
+        with Usd.EditContext(opened.stage, Usd.EditTarget(opened.session)):
+            for text in variants:
+                _select_variant(opened, text)
+        bring_in_documents(opened, diagnostics)
+    with Usd.EditContext(opened.stage, Usd.EditTarget(opened.session)):
         items = overrides.items() if isinstance(overrides, Mapping) else [_split_override(text) for text in overrides]
         for target, value in items:
             _set_value(opened, target, value)
@@ -435,17 +494,15 @@ def composition_warnings(opened: OpenedStage, missing: str, diagnostics: Diagnos
     def described(error: Any) -> tuple[str, str, Any]:
         path = getattr(getattr(error, "rootSite", None), "path", None)
         where = place(path) if path is not None and not path.isEmpty else opened.source
-        return where, " ".join(str(error).split()), error
+        return where, plain_names(" ".join(str(error).split())), error
 
     # USD gives them in no order that two runs share.
     for where, text, error in sorted(map(described, _composition_errors(opened.stage)), key=lambda found: found[:2]):
         kind = "missing-reference" if isinstance(error, _MISSING) else "composition-error"
-        target = _ASSET.search(text)
-        if kind == "missing-reference" and target and target[1].split(":SDF_FORMAT_ARGS")[0].endswith(".mtlx"):
-            text = (
-                f"@{target[1]}@ is a MaterialX document, which this USD does not read: "
-                "its materials are empty; inline them in the USD file"
-            )
+        document = document_name(text)
+        reason = opened.documents.get(document) if document else None
+        if isinstance(reason, str):
+            text = f"@{document}@ {reason}"
         if kind == "missing-reference" and missing == "error":
             raise StageError(f"{where}: {text}: add what is missing, or choose --missing warn")
         diagnostics.warn(kind, where, text)
@@ -459,6 +516,7 @@ def _composition_errors(stage: Any) -> list[Any]:
 
 
 _ASSET = re.compile(r"@([^@]+)@")
+_FORMAT_ARGUMENTS = ":SDF_FORMAT_ARGS:"
 _MISSING = tuple(
     getattr(Pcp, name)
     for name in (

@@ -76,10 +76,63 @@ FULL_PURPOSE: Final = "full"
 OUTPUTS_PREFIX: Final = "outputs:"
 INPUTS: Final = "inputs"
 INPUTS_PREFIX: Final = "inputs:"
+INFO: Final = "info"
+INFO_ID: Final = "info:id"
+SURFACE_OUTPUT: Final = "outputs:surface"
+MATERIALX_SURFACE_OUTPUT: Final = "outputs:mtlx:surface"
 # The surface terminals in the order they are looked for; those of other render contexts come after.
-SURFACE_OUTPUTS: Final = ("outputs:abbe:surface", "outputs:mtlx:surface", "outputs:surface")
-CONSTANT_NODE_PREFIX: Final = "ND_constant_"
-CONSTANT_NODE_INPUT: Final = "value"
+SURFACE_OUTPUTS: Final = ("outputs:abbe:surface", MATERIALX_SURFACE_OUTPUT, SURFACE_OUTPUT)
+SOURCE_ASSET: Final = "sourceAsset"
+SUB_IDENTIFIER: Final = "subIdentifier"
+MATERIALX_NODE_PREFIX: Final = "ND_"
+# What UsdMtlx makes of a MaterialX document.
+MATERIALX_EXTENSION: Final = "mtlx"
+MATERIALX_ROOT: Final = "/MaterialX"
+NODE_GRAPHS: Final = "NodeGraphs"
+MATERIALX_VERSION: Final = "config:mtlx:version"
+# Nodes that read a primvar: the input that names it, and the one that has the value where there is none.
+PRIMVAR_NODES: Final = {
+    "UsdPrimvarReader_": ("varname", "fallback"),
+    "ND_UsdPrimvarReader_": ("varname", "fallback"),
+    "ND_geompropvalue_": ("geomprop", "default"),
+    "ND_geompropvalueuniform_": ("geomprop", "default"),
+}
+# The last part of their names, and of MaterialX nodes' names, to Sdf types.
+MATERIALX_TYPES: Final = {
+    "boolean": "bool",
+    "integer": "int",
+    "float": "float",
+    "color3": "color3f",
+    "color4": "color4f",
+    "vector2": "float2",
+    "vector3": "float3",
+    "vector4": "float4",
+    "matrix33": "matrix3d",
+    "matrix44": "matrix4d",
+    "string": "string",
+    "filename": "asset",
+    "geomname": "string",
+    "integerarray": "int[]",
+    "floatarray": "float[]",
+    "color3array": "color3f[]",
+    "color4array": "color4f[]",
+    "vector2array": "float2[]",
+    "vector3array": "float3[]",
+    "vector4array": "float4[]",
+    "stringarray": "string[]",
+    "geomnamearray": "string[]",
+    "surfaceshader": "token",
+}
+PRIMVAR_READER_TYPES: Final = {
+    "int": "int",
+    "float2": "float2",
+    "float3": "float3",
+    "float4": "float4",
+    "normal": "normal3f",
+    "point": "point3f",
+    "vector": "vector3f",
+    "matrix": "matrix4d",
+}
 
 # Cameras.
 PERSPECTIVE: Final = "perspective"

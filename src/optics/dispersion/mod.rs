@@ -1,138 +1,101 @@
 //! How a refractive index depends on wavelength: laws with n, ∂n/∂λ and ∂²n/∂λ² in closed form.
 //!
-//! | law | n(λ), λ in µm | file |
-//! |---|---|---|
-//! | constant | n | here |
-//! | Cauchy | A + B λ⁻² + C λ⁻⁴ + … | `cauchy.rs` |
-//! | Abbe number | n_d + B (λ⁻² − λ_d⁻²), B from V_d | `cauchy.rs` |
-//! | Sellmeier | n² = A + Σ Bᵢ λ² / (λ² − Cᵢ) | `sellmeier.rs` |
+//! | law | n(λ), λ in µm |
+//! |---|---|
+//! | constant | n |
+//! | Cauchy | n = A + B λ⁻² + C λ⁻⁴ + … |
+//! | Abbe number | n = n_d + B (λ⁻² − λ_d⁻²), B from V_d |
+//! | Sellmeier | n² = A + Σ Bᵢ λ² / (λ² − Cᵢ) |
+//! | Schott | n² = a₀ + a₁ λ² + a₂ λ⁻² + a₃ λ⁻⁴ + … |
+//! | Conrady | n = A + B λ⁻¹ + C λ⁻³·⁵ |
+//! | formulas 1 to 9 of refractiveindex.info | `formula.rs` |
+//! | table | cubic spline |
 //!
-//! A law that exists is usable in all of 360–830 nm: constructors prove that no pole lies there and that n stays within
-//! 0.01–100, by bounds on intervals and not by sampling. Their errors say what is wrong and what to do; the caller adds
-//! where. A law is a file with a type that answers `at`, `check` and `describe`; this file only forwards.
+//! A [`Law`] is what is stated; a [`Dispersion`] is a law that is usable in all of 360–830 nm (or as much of it as its
+//! valid range covers): its constructor proves that no pole lies there and that n stays within 0.01–100, by bounds on
+//! intervals and not by sampling. Errors say what is wrong and what to do; the caller adds where.
+//!
+//! Every formula in print is n, n² or the Lorentz–Lorenz ratio (`series.rs`) as a sum of five kinds of terms (`term.rs`),
+//! so that derivatives and bounds are written once a term. A new formula is a line in `law.rs` or `formula.rs`.
 
-mod cauchy;
+mod abbe_number;
+mod formula;
+mod law;
 mod range;
-mod sellmeier;
+mod series;
+mod spline;
+mod table;
+mod term;
+mod valid;
 
-use cauchy::{AbbeNumber, Cauchy};
+pub use law::Law;
+pub use table::check_wavelengths;
+pub use valid::{OutOfRange, ValidRange};
+
+use law::finite;
 use range::IorRange;
-use sellmeier::Sellmeier;
 
 use super::IorJet;
-use crate::spectrum::{Wavelength, lines};
+use crate::spectrum::{LONGEST, SHORTEST, Wavelength, lines};
 
-/// More terms than any law in print; a limit on what a hostile file can make us compute.
-const MOST_TERMS: usize = 64;
-
-/// The dispersion of a medium: a law, and the artistic scale of its deviation from n_d.
+/// The dispersion of a medium: a law, where it holds, and the artistic scale of its deviation from n_d.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dispersion {
     law: Law,
+    valid: Option<ValidRange>,
+    out_of_range: OutOfRange,
     scale: f64,
     /// n_d of the law, about which `scale` works.
     ior_d: f64,
 }
 
-#[derive(Clone, Debug, PartialEq)]
-enum Law {
-    Constant(f64),
-    Cauchy(Cauchy),
-    AbbeNumber(AbbeNumber),
-    Sellmeier(Sellmeier),
-}
-
-impl Law {
-    /// n, n', n'' with λ in µm.
-    fn at(&self, micrometers: f64) -> [f64; 3] {
-        match self {
-            Self::Constant(ior) => [*ior, 0.0, 0.0],
-            Self::Cauchy(law) => law.at(micrometers),
-            Self::AbbeNumber(law) => law.at(micrometers),
-            Self::Sellmeier(law) => law.at(micrometers),
-        }
-    }
-
-    fn check(&self, range: &IorRange) -> Result<(), String> {
-        match self {
-            Self::Constant(ior) => range.check_value(*ior),
-            Self::Cauchy(law) => law.check(range),
-            Self::AbbeNumber(law) => law.check(range),
-            Self::Sellmeier(law) => law.check(range),
-        }
-    }
-
-    fn is_constant(&self) -> bool {
-        match self {
-            Self::Constant(_) => true,
-            Self::Cauchy(law) => law.is_constant(),
-            Self::AbbeNumber(law) => law.is_constant(),
-            Self::Sellmeier(law) => law.is_constant(),
-        }
-    }
-
-    fn describe(&self) -> String {
-        match self {
-            Self::Constant(ior) => format!("constant, n = {ior}"),
-            Self::Cauchy(law) => law.describe(),
-            Self::AbbeNumber(law) => law.describe(),
-            Self::Sellmeier(law) => law.describe(),
-        }
-    }
-}
-
 impl Dispersion {
-    /// An index that does not depend on wavelength.
-    pub fn constant(ior: f64) -> Result<Self, String> {
-        finite("the index", &[ior])?;
-        Self::new(Law::Constant(ior))
-    }
-
-    /// Cauchy's law n = A + B λ⁻² + C λ⁻⁴ + …; `coefficients` are A, B in µm², C in µm⁴ …
-    pub fn cauchy(coefficients: &[f64]) -> Result<Self, String> {
-        finite("Cauchy coefficients", coefficients)?;
-        Self::new(Law::Cauchy(Cauchy::new(coefficients)))
-    }
-
-    /// Sellmeier's law n² = 1 + Σ Bᵢ λ² / (λ² − Cᵢ), Cᵢ in µm² as given (refractiveindex.info formula 2 without its leading
-    /// constant, and the glass makers' own).
-    pub fn sellmeier(b: &[f64], c_um2: &[f64]) -> Result<Self, String> {
-        same_length(b, c_um2)?;
-        finite("Sellmeier coefficients B", b)?;
-        finite("Sellmeier coefficients C", c_um2)?;
-        Self::new(Law::Sellmeier(Sellmeier::new(1.0, b, c_um2)))
-    }
-
-    /// Sellmeier's law n² = 1 + `constant` + Σ Bᵢ λ² / (λ² − Cᵢ²), Cᵢ in µm and squared here (refractiveindex.info
-    /// formula 1, whose first coefficient is `constant`).
-    pub fn sellmeier_squared(constant: f64, b: &[f64], c_um: &[f64]) -> Result<Self, String> {
-        same_length(b, c_um)?;
-        finite("the Sellmeier constant", &[constant])?;
-        finite("Sellmeier coefficients B", b)?;
-        finite("Sellmeier coefficients C", c_um)?;
-        let c_um2: Vec<f64> = c_um.iter().map(|c| c * c).collect();
-        finite("squared Sellmeier coefficients C", &c_um2)?;
-        Self::new(Law::Sellmeier(Sellmeier::new(1.0 + constant, b, &c_um2)))
-    }
-
-    /// The two-term Cauchy law with index `nd` at the d line and Abbe number `vd` = (n_d − 1)/(n_F − n_C).
-    pub fn from_abbe_number(nd: f64, vd: f64) -> Result<Self, String> {
-        finite("n_d and V_d", &[nd, vd])?;
-        if vd <= 0.0 {
-            return Err(format!(
-                "the Abbe number is {vd}, it must be positive: real media have 15 to 100; for no dispersion use a constant \
-                 index"
-            ));
+    /// The dispersion that `law` states, which holds in `valid` (everywhere if `None`, from end to end for a table).
+    ///
+    /// Refused are a pole and an index outside of 0.01–100 anywhere in 360–830 nm, as far as the law is used there: unless
+    /// it is extrapolated, within `valid` only, which then has to hold the d line.
+    pub fn new(law: Law, valid: Option<ValidRange>, out_of_range: OutOfRange) -> Result<Self, String> {
+        let valid = valid.or(law.own_range());
+        if let Some(range) = valid {
+            law.check_range(range, out_of_range)?;
         }
-        Self::new(Law::AbbeNumber(AbbeNumber::new(nd, vd)))
+        let mut dispersion = Self { law, valid, out_of_range, scale: 1.0, ior_d: 1.0 };
+        dispersion.law.check(&IorRange::physical(), dispersion.used_band())?;
+        dispersion.ior_d = dispersion.law.at(lines::D.micrometers())[0];
+        // A law without dispersion has derivatives that are zero, not zero times something.
+        if dispersion.law.is_constant() {
+            dispersion.law = Law::constant(dispersion.ior_d)?;
+        }
+        Ok(dispersion)
     }
 
-    fn new(law: Law) -> Result<Self, String> {
-        law.check(&IorRange::physical())?;
-        // A law without dispersion has derivatives that are zero, not zero times something.
-        let law = if law.is_constant() { Law::Constant(law.at(lines::D.micrometers())[0]) } else { law };
-        let ior_d = law.at(lines::D.micrometers())[0];
-        Ok(Self { law, scale: 1.0, ior_d })
+    fn everywhere(law: Law) -> Result<Self, String> {
+        Self::new(law, None, OutOfRange::Extrapolate)
+    }
+
+    /// [`Law::constant`], valid everywhere.
+    pub fn constant(ior: f64) -> Result<Self, String> {
+        Self::everywhere(Law::constant(ior)?)
+    }
+
+    /// [`Law::cauchy`], valid everywhere.
+    pub fn cauchy(coefficients: &[f64]) -> Result<Self, String> {
+        Self::everywhere(Law::cauchy(coefficients)?)
+    }
+
+    /// [`Law::sellmeier`], valid everywhere.
+    pub fn sellmeier(b: &[f64], c_um2: &[f64]) -> Result<Self, String> {
+        Self::everywhere(Law::sellmeier(b, c_um2)?)
+    }
+
+    /// [`Law::sellmeier_squared`], valid everywhere.
+    pub fn sellmeier_squared(constant: f64, b: &[f64], c_um: &[f64]) -> Result<Self, String> {
+        Self::everywhere(Law::sellmeier_squared(constant, b, c_um)?)
+    }
+
+    /// [`Law::abbe_number`], valid everywhere.
+    pub fn from_abbe_number(nd: f64, vd: f64) -> Result<Self, String> {
+        Self::everywhere(Law::abbe_number(nd, vd)?)
     }
 
     /// The same medium with n(λ) − n_d multiplied by `scale`: 0 switches dispersion off, 1 is physical. Scales multiply.
@@ -145,35 +108,51 @@ impl Dispersion {
         }
         let scale = self.scale * scale;
         if scale == 0.0 {
-            return Ok(Self { law: Law::Constant(self.ior_d), scale: 1.0, ior_d: self.ior_d });
+            return Ok(Self { law: Law::constant(self.ior_d)?, scale: 1.0, ..self.clone() });
         }
         self.law
-            .check(&IorRange::physical().before_scaling(scale, self.ior_d))
+            .check(&IorRange::physical().before_scaling(scale, self.ior_d), self.used_band())
             .map_err(|problem| format!("with the dispersion scaled by {scale}, {problem}"))?;
-        Ok(Self { law: self.law.clone(), scale, ior_d: self.ior_d })
+        Ok(Self { scale, ..self.clone() })
     }
 
     /// n, ∂n/∂λ, ∂²n/∂λ² at `wavelength`.
     ///
-    /// Outside of 360–830 nm the law is evaluated as it stands, which may have a pole there or no real value (NaN).
+    /// Outside of the valid range the index is that of its nearest end and the derivatives are 0, unless the law is
+    /// extrapolated. [`OutOfRange::Error`] is the caller's to mind: ask [`is_valid_at`](Self::is_valid_at) first. A law
+    /// outside of 360–830 nm is evaluated as it stands and may have a pole there or no real value (NaN).
     pub fn at(&self, wavelength: Wavelength) -> IorJet {
-        let [ior, first, second] = self.law.at(wavelength.micrometers());
-        // Per µm to per nm.
-        let (first, second) = (first / 1e3, second / 1e6);
-        if self.is_scaled() {
-            IorJet {
-                ior: self.ior_d + self.scale * (ior - self.ior_d),
-                dior_dlambda: self.scale * first,
-                d2ior_dlambda2: self.scale * second,
-            }
-        } else {
-            IorJet { ior, dior_dlambda: first, d2ior_dlambda2: second }
+        let held = match self.valid {
+            Some(range) if self.out_of_range != OutOfRange::Extrapolate => range.clamp(wavelength),
+            _ => wavelength,
+        };
+        let [ior, first, second] = self.law.at(held.micrometers());
+        let ior = if self.is_scaled() { self.ior_d + self.scale * (ior - self.ior_d) } else { ior };
+        if held != wavelength {
+            return IorJet::constant(ior);
         }
+        // Per µm to per nm.
+        IorJet { ior, dior_dlambda: self.scale * (first / 1e3), d2ior_dlambda2: self.scale * (second / 1e6) }
+    }
+
+    /// Where the law holds; everywhere if `None`.
+    pub fn valid_range(&self) -> Option<ValidRange> {
+        self.valid
+    }
+
+    /// What becomes of wavelengths outside of the valid range.
+    pub fn out_of_range(&self) -> OutOfRange {
+        self.out_of_range
+    }
+
+    /// Whether `wavelength` lies within the valid range.
+    pub fn is_valid_at(&self, wavelength: Wavelength) -> bool {
+        self.valid.is_none_or(|range| range.contains(wavelength))
     }
 
     /// Whether the index does not depend on wavelength; then derivatives are exactly 0.
     pub fn is_constant(&self) -> bool {
-        matches!(self.law, Law::Constant(_))
+        self.law.is_constant()
     }
 
     #[expect(clippy::float_cmp, reason = "1 is a setting here, not a result: then not even a rounding is added")]
@@ -181,42 +160,53 @@ impl Dispersion {
         self.scale != 1.0
     }
 
-    /// V_d = (n_d − 1)/(n_F − n_C); `None` if n_F = n_C, as for a constant index.
+    /// V_d = (n_d − 1)/(n_F − n_C); `None` if n_F = n_C, as for a constant index, or if a line lies outside of the valid
+    /// range of a law that is not extrapolated.
     pub fn abbe_number(&self) -> Option<f64> {
+        let is_known = |line| self.out_of_range == OutOfRange::Extrapolate || self.is_valid_at(line);
+        if !(is_known(lines::F) && is_known(lines::C)) {
+            return None;
+        }
         let ior = |line: Wavelength| self.at(line).ior;
         let difference = ior(lines::F) - ior(lines::C);
         (difference != 0.0).then(|| (ior(lines::D) - 1.0) / difference)
     }
 
-    /// The law with its coefficients, n_d and V_d, in one line.
+    /// How far ∂²n/∂λ² of a table can be trusted: by which part of its size (root mean squares over 360–830 nm) it changes
+    /// when every second entry is left out. `None` for a formula, and for a table with too few entries to tell.
+    pub fn curvature_doubt(&self) -> Option<f64> {
+        self.law.curvature_doubt()
+    }
+
+    /// The law with its coefficients, valid range, n_d and V_d, in one line.
     pub fn describe(&self) -> String {
         let mut text = self.law.describe();
         if self.is_scaled() {
             text += &format!(", dispersion scaled by {}", self.scale);
         }
-        if let Some(vd) = self.abbe_number() {
-            text += &format!(" (n_d = {:.6}, V_d = {vd:.3})", self.ior_d);
+        if let Some(range) = self.valid {
+            let outside = match self.out_of_range {
+                OutOfRange::Clamp => "constant outside",
+                OutOfRange::Error => "not to be used outside",
+                OutOfRange::Extrapolate => "extrapolated outside",
+            };
+            text += &format!(", valid from {range}, {outside}");
+        }
+        match self.abbe_number() {
+            Some(vd) => text += &format!(" (n_d = {:.6}, V_d = {vd:.3})", self.ior_d),
+            None if !self.is_constant() => text += &format!(" (n_d = {:.6})", self.ior_d),
+            None => {}
         }
         text
     }
-}
 
-fn finite(what: &str, values: &[f64]) -> Result<(), String> {
-    if values.is_empty() {
-        return Err(format!("{what}: none are given, at least one is needed"));
+    /// The part of 360–830 nm in which the law is evaluated, µm: from the outside it is held at the ends of its range.
+    fn used_band(&self) -> [f64; 2] {
+        let visible = [SHORTEST, LONGEST];
+        let used = match self.valid {
+            Some(range) if self.out_of_range != OutOfRange::Extrapolate => visible.map(|end| range.clamp(end)),
+            _ => visible,
+        };
+        used.map(Wavelength::micrometers)
     }
-    if values.len() > MOST_TERMS {
-        return Err(format!("{what}: {} are given, at most {MOST_TERMS} are understood", values.len()));
-    }
-    match values.iter().find(|value| !value.is_finite()) {
-        Some(value) => Err(format!("{what}: {value} is no finite number")),
-        None => Ok(()),
-    }
-}
-
-fn same_length(b: &[f64], c: &[f64]) -> Result<(), String> {
-    if b.len() == c.len() {
-        return Ok(());
-    }
-    Err(format!("{} Sellmeier coefficients B with {} coefficients C: each term needs one of each", b.len(), c.len()))
 }

@@ -1,10 +1,11 @@
-//! Proofs that an index stays in its range over the whole band.
+//! Proofs that an index stays in its range over a whole band.
 //!
-//! Every law here is a sum of terms that are monotone in λ between poles. On an interval such a sum is bounded by the sums
-//! of its terms' smaller and larger end values; halving the interval tightens the bound. So "positive everywhere" is
-//! decided, not sampled.
+//! Every formula here is a sum of terms that are monotone in λ between their poles and turning points. On an interval
+//! such a sum is bounded by the sums of its terms' smallest and largest values; halving the interval tightens the
+//! bounds. So "positive everywhere" is decided, not sampled.
 
-use crate::spectrum::{LONGEST, SHORTEST};
+use super::series::Quantity;
+use super::term::{Rounded, Term};
 
 /// The open interval in which n(λ) has to stay.
 pub(super) struct IorRange {
@@ -16,7 +17,7 @@ pub(super) struct IorRange {
 /// a coefficient in another unit (nm² for µm² is a factor 10⁶), which had better be refused than rendered.
 const LARGEST: f64 = 100.0;
 
-/// Halvings before an undecided interval counts as a violation: n then comes within 10⁻⁴ of its limit or is a difference
+/// Intervals before an undecided one counts as a violation: n then comes within 10⁻⁴ of its limit or is a difference
 /// of coefficients so large that its digits mean nothing.
 const MOST_INTERVALS: usize = 1 << 14;
 
@@ -33,66 +34,105 @@ impl IorRange {
         Self { above: self.above.max(one.min(other)), below: self.below.min(one.max(other)) }
     }
 
-    /// Whether one value lies inside.
+    /// Whether an index lies inside, for all that it may be off by.
+    pub(super) fn contains(&self, ior: Rounded) -> bool {
+        let slack = slack(1, ior.magnitude);
+        ior.value - slack > self.above && ior.value + slack < self.below
+    }
+
+    /// Whether one exact value lies inside.
     pub(super) fn check_value(&self, ior: f64) -> Result<(), String> {
-        if ior > self.above && ior < self.below {
+        if self.contains(Rounded { value: ior, magnitude: 0.0 }) {
             return Ok(());
         }
         Err(format!("the index is {ior}, it must lie between {} and {}", self.above, self.below))
     }
 
-    /// Whether a law with this `ior` (of λ in µm) stays inside for all of 360–830 nm. `terms` sum to `transform`(n), a
-    /// growing function of n > 0; each is monotone in λ there.
+    /// Whether a law with this `ior` (of λ in µm) stays inside for all of `band` (µm), in which its terms have no poles.
+    /// `constant` and `terms` sum to `quantity` of the index.
     pub(super) fn check(
         &self,
-        terms: usize,
-        term: impl Fn(usize, f64) -> f64,
-        transform: impl Fn(f64) -> f64,
+        band: [f64; 2],
+        quantity: Quantity,
+        constant: f64,
+        terms: &[Term],
         ior: impl Fn(f64) -> f64,
     ) -> Result<(), String> {
-        let explain = |micrometers: f64| {
-            let ior = ior(micrometers);
-            let what =
-                if ior.is_nan() { "the law has no real index".to_owned() } else { format!("the index is {ior:.6}") };
-            format!(
-                "{what} at {:.3} nm, within 360–830 nm it must lie between {} and {}: check the coefficients and their \
-                 units (µm)",
-                1e3 * micrometers,
-                self.above,
-                self.below
-            )
+        let (above, below) = (quantity.of(self.above), quantity.of(self.below));
+        // Asked for the good case, so that NaN is refused too.
+        let inside = |micrometers: f64| {
+            let sum = terms.iter().map(|term| term.at(micrometers)[0]).sum::<f64>() + constant;
+            if sum > above && sum < below { Ok(()) } else { Err(self.explain(micrometers, ior(micrometers), band)) }
         };
-        stays_positive(terms + 1, |k, x| if k < terms { term(k, x) } else { -transform(self.above) })
-            .map_err(explain)?;
-        stays_positive(terms + 1, |k, x| if k < terms { -term(k, x) } else { transform(self.below) }).map_err(explain)
+        inside(band[0])?;
+        inside(band[1])?;
+        let parts: Vec<(&Term, Vec<f64>)> = terms.iter().map(|term| (term, term.turning_points())).collect();
+        let mut open = vec![band];
+        for _ in 0..MOST_INTERVALS {
+            let Some(interval) = open.pop() else { return Ok(()) };
+            let (mut low, mut high, mut magnitude) = (constant, constant, constant.abs());
+            for (term, turning) in &parts {
+                let extremes = Extremes::of(term, turning, interval);
+                low += extremes.low;
+                high += extremes.high;
+                magnitude += extremes.magnitude;
+            }
+            let slack = slack(terms.len(), magnitude);
+            if low - slack > above && high + slack < below {
+                continue;
+            }
+            let middle = 0.5 * (interval[0] + interval[1]);
+            inside(middle)?;
+            open.push([middle, interval[1]]);
+            open.push([interval[0], middle]);
+        }
+        let undecided = open.last().map_or(band[0], |interval| interval[0]);
+        Err(self.explain(undecided, ior(undecided), band))
+    }
+
+    /// An index outside, or one that cannot be told from the limit, as an error.
+    pub(super) fn explain(&self, micrometers: f64, ior: f64, band: [f64; 2]) -> String {
+        let what = if ior.is_nan() { "the law has no real index".to_owned() } else { format!("the index is {ior:.6}") };
+        format!(
+            "{what} at {:.3} nm, within {:.0}–{:.0} nm it must lie between {} and {}: check the coefficients and their units \
+             (µm)",
+            1e3 * micrometers,
+            1e3 * band[0],
+            1e3 * band[1],
+            self.above,
+            self.below
+        )
     }
 }
 
-/// `Err(λ)` with a place where the sum of the monotone terms is not positive or not certainly so.
-fn stays_positive(terms: usize, term: impl Fn(usize, f64) -> f64) -> Result<(), f64> {
-    let (first, last) = (SHORTEST.micrometers(), LONGEST.micrometers());
-    let value = |x: f64| (0..terms).map(|k| term(k, x)).sum::<f64>();
-    // Asked for the good case, so that NaN is refused too.
-    let positive_at = |x: f64| if value(x) > 0.0 { Ok(()) } else { Err(x) };
-    positive_at(first)?;
-    positive_at(last)?;
-    let mut open = vec![(first, last)];
-    for _ in 0..MOST_INTERVALS {
-        let Some((a, b)) = open.pop() else { return Ok(()) };
-        let (mut lower, mut magnitude) = (0.0, 0.0);
-        for k in 0..terms {
-            let (at_a, at_b) = (term(k, a), term(k, b));
-            lower += at_a.min(at_b);
-            magnitude += at_a.abs().max(at_b.abs());
+/// What a sum of `terms` values may be off by: each is right to 8 times ε of its magnitude (a power, a square, a
+/// difference, a product and a quotient), and each addition to ε of the sum.
+fn slack(terms: usize, magnitude: f64) -> f64 {
+    (8.0 + terms as f64) * f64::EPSILON * magnitude
+}
+
+/// Bounds of one term on an interval without poles.
+struct Extremes {
+    low: f64,
+    high: f64,
+    magnitude: f64,
+}
+
+impl Extremes {
+    /// At the ends, or where the term turns. There it is flat: that the place is rounded is of second order.
+    fn of(term: &Term, turning: &[f64], [a, b]: [f64; 2]) -> Self {
+        let inside = turning.iter().copied().filter(|point| *point > a && *point < b);
+        let mut extremes = Self { low: f64::INFINITY, high: f64::NEG_INFINITY, magnitude: 0.0 };
+        for point in [a, b].into_iter().chain(inside) {
+            let Rounded { value, magnitude } = term.rounded(point);
+            // A value that is not a number must not be passed over, as min and max would.
+            if value.is_nan() {
+                return Self { low: f64::NAN, high: f64::NAN, magnitude: f64::NAN };
+            }
+            extremes.low = extremes.low.min(value);
+            extremes.high = extremes.high.max(value);
+            extremes.magnitude = extremes.magnitude.max(magnitude);
         }
-        // Each term is right to a few ulp and each addition to half of one.
-        if lower > 4.0 * terms as f64 * f64::EPSILON * magnitude {
-            continue;
-        }
-        let middle = 0.5 * (a + b);
-        positive_at(middle)?;
-        open.push((middle, b));
-        open.push((a, middle));
+        extremes
     }
-    Err(open.last().map_or(first, |&(a, _)| a))
 }

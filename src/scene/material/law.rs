@@ -1,11 +1,21 @@
-//! Our own attributes on a material, its shader and its interface: which law of n(λ) they state.
+//! Our own attributes on a material, its shader and its interface: which law of n(λ) they state, which absorption and
+//! which priority.
+//!
+//! Which of several forms is meant is decided here; `compile` makes the law of it, `absorption` reads k(λ) and plates.
+
+mod absorption;
+mod compile;
+#[cfg(test)]
+mod tests;
 
 use crate::diagnostics::Diagnostics;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::optics::dispersion::Dispersion;
-use crate::spectrum;
+use crate::optics::media::Priority;
 
 use super::values::Values;
+
+pub(super) use absorption::StatedAbsorption;
 
 const GLASS: &str = "abbe:glass";
 const LAW: &str = "abbe:dispersion:law";
@@ -19,11 +29,14 @@ const COEFFICIENTS: &str = "abbe:dispersion:coefficients";
 const TABLE: &str = "abbe:dispersion:table";
 const VALID_RANGE: &str = "abbe:dispersion:validRange";
 const OUT_OF_RANGE: &str = "abbe:dispersion:outOfRange";
+const EXTINCTION: &str = "abbe:extinction:table";
+const TRANSMITTANCE: &str = "abbe:internalTransmittance:table";
+const THICKNESS: &str = "abbe:internalTransmittance:thickness";
 const SCALE: &str = "abbe:dispersion:scale";
 const PRIORITY: &str = "abbe:dielectricPriority";
 
-/// Read here.
-const READ: &[&str] = &[
+/// Everything that AbbeDispersionAPI declares.
+const ATTRIBUTES: &[&str] = &[
     GLASS,
     LAW,
     ND,
@@ -36,13 +49,12 @@ const READ: &[&str] = &[
     TABLE,
     VALID_RANGE,
     OUT_OF_RANGE,
+    EXTINCTION,
+    TRANSMITTANCE,
+    THICKNESS,
     SCALE,
     PRIORITY,
 ];
-
-/// Declared by the schema, and not computed with: absorption and metals have no part in the specular chain.
-const UNREAD: &[&str] =
-    &["abbe:extinction:table", "abbe:internalTransmittance:table", "abbe:internalTransmittance:thickness"];
 
 /// The laws that can be stated, by precedence where several are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +86,20 @@ impl Form {
 
     fn of_token(token: &str) -> Option<Self> {
         std::iter::once(Self::Constant).chain(Self::BY_PRECEDENCE).find(|form| form.token() == token)
+    }
+
+    /// The attribute that an error or a plan points to.
+    fn place(self, values: &Values<'_>) -> String {
+        values.place(match self {
+            Self::Constant => ND,
+            Self::Glass => GLASS,
+            Self::Sellmeier => SELLMEIER_B,
+            Self::Cauchy => CAUCHY,
+            Self::Formula => COEFFICIENTS,
+            Self::Table => TABLE,
+            Self::AbbeNumber if !values.has(VD) => ND,
+            Self::AbbeNumber => VD,
+        })
     }
 
     /// Whether `values` authors this law. Fallbacks written out ("" and []) and a zero index say nothing; a zero Abbe
@@ -142,11 +168,14 @@ impl<'a> Authored<'a> {
         }
         let form = match values.text(LAW)? {
             Some(token) => match Form::of_token(token) {
-                Some(form) => form,
+                Some(form) => {
+                    warn_of_silenced(form, &authored, values, diagnostics)?;
+                    form
+                }
                 None => {
                     return values.refuse(
                         LAW,
-                        "author constant, abbeNumber, cauchy, sellmeier or formula, or nothing to infer it",
+                        "author glass, sellmeier, cauchy, formula, table, abbeNumber or constant, or nothing to infer it",
                     );
                 }
             },
@@ -162,25 +191,23 @@ impl<'a> Authored<'a> {
                 authored[0]
             }
         };
-        let dispersion = compile(form, values, shader_ior, diagnostics)?;
-        check_range(values, diagnostics)?;
+        let dispersion = compile::dispersion(form, values, shader_ior, diagnostics)?;
         let source = match form {
             Form::Constant => values.place(LAW),
-            Form::AbbeNumber if !values.has(VD) => values.place(ND),
-            _ => values.place(attribute(form)),
+            _ => form.place(values),
         };
         Ok(Some(Stated { dispersion, source }))
     }
 
-    /// Names every attribute that has no effect: not computed with yet, or misspelt.
+    /// Names every attribute that is none of ours.
     pub(super) fn warn_of_unread(&self, diagnostics: &mut Diagnostics) {
         for values in &self.places {
-            for name in values.names().filter(|name| !READ.contains(name)) {
-                let message = match UNREAD.contains(&name) {
-                    true => "absorption is not computed by this version: the attribute has no effect",
-                    false => "is no attribute of AbbeDispersionAPI and has no effect: is it misspelt?",
-                };
-                diagnostics.warn("unread-attribute", values.place(name), message);
+            for name in values.names().filter(|name| !ATTRIBUTES.contains(name)) {
+                diagnostics.warn(
+                    "unread-attribute",
+                    values.place(name),
+                    "is no attribute of AbbeDispersionAPI and has no effect: is it misspelt?",
+                );
             }
         }
     }
@@ -204,176 +231,36 @@ impl<'a> Authored<'a> {
         place.map_or_else(String::new, |values| values.place(SCALE))
     }
 
-    /// The dielectric priority, 0 (unset) if not authored.
-    pub(super) fn priority(&self) -> Result<i32> {
+    /// The dielectric priority and where it stands; `None` where none is set (0 is unset).
+    pub(super) fn priority(&self) -> Result<Option<(Priority, String)>> {
         for values in &self.places {
-            if let Some(priority) = values.int(PRIORITY)? {
-                return Ok(priority);
+            if let Some(number) = values.int(PRIORITY)? {
+                let priority = Priority::lower_wins(number);
+                return Ok((priority != Priority::UNSET)
+                    .then(|| (priority, format!("{number} (lower wins) from {}", values.place(PRIORITY)))));
             }
         }
-        Ok(0)
+        Ok(None)
     }
 }
 
-/// The attribute that an error or a plan points to.
-fn attribute(form: Form) -> &'static str {
-    match form {
-        Form::Constant => ND,
-        Form::Glass => GLASS,
-        Form::Sellmeier => SELLMEIER_B,
-        Form::Cauchy => CAUCHY,
-        Form::Formula => COEFFICIENTS,
-        Form::Table => TABLE,
-        Form::AbbeNumber => VD,
-    }
-}
-
-fn compile(form: Form, values: &Values<'_>, shader_ior: f64, diagnostics: &mut Diagnostics) -> Result<Dispersion> {
-    let at = |name: &str| {
-        let place = values.place(name);
-        move |problem: String| Error::scene(place, problem)
-    };
-    match form {
-        Form::Constant => Dispersion::constant(index(values, shader_ior, diagnostics)?).map_err(at(ND)),
-        Form::AbbeNumber => {
-            let nd = index(values, shader_ior, diagnostics)?;
-            let Some(vd) = values.double(VD, diagnostics)? else {
-                if values.text(LAW)?.is_some() {
-                    return values.refuse(VD, "law abbeNumber needs it: author the Abbe number, or 0 for no dispersion");
-                }
-                return Dispersion::constant(nd).map_err(at(ND));
-            };
-            if vd < 0.0 {
-                return values.refuse(VD, "author a positive Abbe number, or 0 for no dispersion");
-            }
-            match vd > 0.0 {
-                true => Dispersion::from_abbe_number(nd, vd).map_err(at(VD)),
-                false => Dispersion::constant(nd).map_err(at(ND)),
-            }
+/// An explicit law decides, but what it overrules was authored on purpose, too.
+fn warn_of_silenced(form: Form, authored: &[Form], values: &Values<'_>, diagnostics: &mut Diagnostics) -> Result<()> {
+    let mut silenced = Vec::new();
+    for &other in authored.iter().filter(|&&other| other != form) {
+        // A constant index is that of nd; an Abbe number of 0 says the same as it does.
+        let agrees =
+            form == Form::Constant && other == Form::AbbeNumber && values.number(VD)?.is_none_or(|vd| vd == 0.0);
+        if !agrees {
+            silenced.push(other.token());
         }
-        Form::Cauchy => {
-            Dispersion::cauchy(&needed(values, CAUCHY, "A, B (µm²), C (µm⁴) …", diagnostics)?).map_err(at(CAUCHY))
-        }
-        Form::Sellmeier => {
-            let b = needed(values, SELLMEIER_B, "B1 B2 …", diagnostics)?;
-            let c = needed(values, SELLMEIER_C, "C1 C2 … in µm²", diagnostics)?;
-            if b.len() != c.len() {
-                return values.refuse(
-                    SELLMEIER_C,
-                    format!("has {} values where {SELLMEIER_B} has {}: author one C for each B", c.len(), b.len()),
-                );
-            }
-            Dispersion::sellmeier(&b, &c).map_err(at(SELLMEIER_B))
-        }
-        Form::Formula => formula(values, diagnostics),
-        Form::Glass => values.refuse(
-            GLASS,
-            "the glass catalogue is not part of this version: author its coefficients as abbe:dispersion:sellmeier:b and :c",
-        ),
-        Form::Table => values.refuse(
-            TABLE,
-            "tabulated indices are not part of this version: author abbe:dispersion:sellmeier:b and :c or abbe:dispersion:cauchy",
-        ),
     }
-}
-
-/// n_d as authored, or the shader's where it is 0 or missing.
-fn index(values: &Values<'_>, shader_ior: f64, diagnostics: &mut Diagnostics) -> Result<f64> {
-    match values.double(ND, diagnostics)? {
-        Some(nd) if nd < 0.0 => values.refuse(ND, "author a positive index, or 0 for the shader's"),
-        Some(nd) if nd > 0.0 => Ok(nd),
-        _ => Ok(shader_ior),
-    }
-}
-
-fn needed(values: &Values<'_>, name: &str, what: &str, diagnostics: &mut Diagnostics) -> Result<Vec<f64>> {
-    match values.doubles(name, diagnostics)? {
-        Some(list) => Ok(list),
-        None => values.refuse(name, format!("the law needs it: author {what}")),
-    }
-}
-
-/// The formulas of refractiveindex.info that are one of our laws. Coefficients are C1, then pairs; λ in µm.
-fn formula(values: &Values<'_>, diagnostics: &mut Diagnostics) -> Result<Dispersion> {
-    let Some(number) = values.int(FORMULA)?.filter(|&number| number != 0) else {
-        return values.refuse(FORMULA, "author the number of the formula that the coefficients belong to");
-    };
-    let coefficients = needed(values, COEFFICIENTS, "the formula's coefficients", diagnostics)?;
-    let (constant, pairs) = (coefficients[0], &coefficients[1..]);
-    let is_known = matches!(number, 1 | 2 | 5);
-    if is_known && pairs.len() % 2 != 0 {
-        return values.refuse(
-            COEFFICIENTS,
-            format!(
-                "formula {number} takes C1 and then pairs, an odd number of values; {} are authored",
-                coefficients.len()
-            ),
-        );
-    }
-    let (first, second): (Vec<f64>, Vec<f64>) = pairs.chunks_exact(2).map(|pair| (pair[0], pair[1])).unzip();
-    let built = match number {
-        // n² − 1 = C1 + Σ C2 λ²/(λ² − C3²)
-        1 => Dispersion::sellmeier_squared(constant, &first, &second),
-        // n² − 1 = C1 + Σ C2 λ²/(λ² − C3): the constant is a term whose pole is at 0.
-        2 if constant != 0.0 => {
-            let b: Vec<_> = std::iter::once(constant).chain(first).collect();
-            let c: Vec<_> = std::iter::once(0.0).chain(second).collect();
-            Dispersion::sellmeier(&b, &c)
-        }
-        2 => Dispersion::sellmeier(&first, &second),
-        // n = C1 + Σ C2 λ^C3
-        5 => {
-            let mut cauchy = vec![constant];
-            for (&factor, &power) in first.iter().zip(&second) {
-                let order = -power / 2.0;
-                let is_even_inverse = order.fract() == 0.0 && (1.0..=8.0).contains(&order);
-                if !is_even_inverse {
-                    return values.refuse(
-                        COEFFICIENTS,
-                        format!("formula 5 with λ^{power} is not part of this version: powers are -2, -4, … -16"),
-                    );
-                }
-                // Whole and within 1..=8 by the check above.
-                let slot = order as usize;
-                cauchy.resize(cauchy.len().max(slot + 1), 0.0);
-                cauchy[slot] += factor;
-            }
-            Dispersion::cauchy(&cauchy)
-        }
-        3 | 4 | 6..=9 => {
-            return values.refuse(
-                FORMULA,
-                "this formula is not part of this version: 1, 2 and 5 are; fit the data with abbe:dispersion:sellmeier:b and :c",
-            );
-        }
-        _ => return values.refuse(FORMULA, "refractiveindex.info has the formulas 1 to 9"),
-    };
-    built.map_err(|problem| Error::scene(values.place(COEFFICIENTS), problem))
-}
-
-/// The range that was authored for the law: it must hold the reference wavelength.
-fn check_range(values: &Values<'_>, diagnostics: &mut Diagnostics) -> Result<()> {
-    if !matches!(values.text(OUT_OF_RANGE)?, None | Some("clamp" | "error" | "extrapolate")) {
-        return values.refuse(OUT_OF_RANGE, "author clamp, error or extrapolate");
-    }
-    let Some(range) = values.doubles(VALID_RANGE, diagnostics)? else { return Ok(()) };
-    let [from, to] = range[..] else { return values.refuse(VALID_RANGE, "author two wavelengths in nm") };
-    if from == 0.0 && to == 0.0 {
-        return Ok(());
-    }
-    let reference = spectrum::REFERENCE.nanometers();
-    if !(from < to && from <= reference && reference <= to) {
-        return values.refuse(
-            VALID_RANGE,
-            format!("author increasing wavelengths in nm around the reference wavelength {reference}"),
-        );
-    }
-    // Transport and observer go from 360 to 830 nm (DESIGN 5).
-    if from > 360.0 || to < 830.0 {
+    if !silenced.is_empty() {
+        let (names, has) = (silenced.join(", "), if silenced.len() == 1 { "has" } else { "have" });
         diagnostics.warn(
-            "valid-range-unread",
-            values.place(VALID_RANGE),
-            "this version extrapolates the law outside its valid range, down to 360 nm and up to 830 nm",
+            "silenced-dispersion-law",
+            values.place(LAW),
+            format!("is {}: what is authored for {names} {has} no effect", form.token()),
         );
     }
     Ok(())

@@ -55,6 +55,21 @@ impl<'a> Values<'a> {
         number.map(Some).ok_or_else(|| self.error(name, "author a finite number"))
     }
 
+    /// A colour, or one number for a grey; alpha is left out.
+    pub(super) fn color(&self, name: &str) -> Result<Option<[f64; 3]>> {
+        let Some(authored) = self.map.get(name) else { return Ok(None) };
+        let color = match &authored.value {
+            Value::Array(parts) => match parts[..] {
+                [ref r, ref g, ref b] | [ref r, ref g, ref b, _] => {
+                    finite(r).zip(finite(g)).zip(finite(b)).map(|((r, g), b)| [r, g, b])
+                }
+                _ => None,
+            },
+            value => finite(value).map(|grey| [grey; 3]),
+        };
+        color.map(Some).ok_or_else(|| self.error(name, "author a colour of three finite numbers"))
+    }
+
     /// A number declared `double` by the schema: single precision is accepted with a warning.
     pub(super) fn double(&self, name: &str, diagnostics: &mut Diagnostics) -> Result<Option<f64>> {
         self.warn_of_single_precision(name, diagnostics);
@@ -76,6 +91,21 @@ impl<'a> Values<'a> {
         match list {
             Some(list) => Ok((!list.is_empty()).then_some(list)),
             None => self.refuse(name, "author a list of finite numbers of type double[]"),
+        }
+    }
+
+    /// A list declared `double2[]`, of pairs; absent where nothing or an empty list is authored.
+    pub(super) fn pairs(&self, name: &str, diagnostics: &mut Diagnostics) -> Result<Option<Vec<[f64; 2]>>> {
+        self.warn_of_single_precision(name, diagnostics);
+        let Some(authored) = self.map.get(name) else { return Ok(None) };
+        let pair = |value: &Value| match value.as_array()?.as_slice() {
+            [first, second] => Some([finite(first)?, finite(second)?]),
+            _ => None,
+        };
+        let list = authored.value.as_array().map(|parts| parts.iter().map(pair).collect::<Option<Vec<_>>>());
+        match list.flatten() {
+            Some(list) => Ok((!list.is_empty()).then_some(list)),
+            None => self.refuse(name, "author a list of pairs of finite numbers of type double2[]"),
         }
     }
 

@@ -1,0 +1,176 @@
+"""Constants through shading networks: what an input is, where its value stands elsewhere or follows from constants.
+
+UsdShade's rules: a connection is stronger than a value; containers (Material, NodeGraph) hand on what they are
+connected to, or their own value; a connection that leads to nothing leaves the input's own value. What shading nodes
+compute from constants is in :mod:`.nodes`; all others, textures above all, drive what is connected to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from . import tokens
+from ._pxr import Sdf, UsdShade
+from .description import Diagnostics
+from .nodes import Value, find_node
+from .values import place
+
+__all__ = ["Driver", "Network", "terminal_shader"]
+
+
+@dataclass(frozen=True)
+class Driver:
+    """What computes a value at render time."""
+
+    path: str
+    """Path of the output."""
+
+
+class _DrivenError(Exception):
+    """An input of a node is no constant."""
+
+
+# Nodes that hand on a surface: the input that they hand on.
+_SURFACE_WRAPPERS = {"ND_dot_surfaceshader": "in", "ND_surfacematerial": "surfaceshader"}
+# Nodes one behind the other; real networks have tens. Deeper ones are not constants to anybody.
+_DEEPEST = 64
+
+
+class Network:
+    """Evaluates the inputs of one material's shaders, every node once."""
+
+    def __init__(self, time: Any, diagnostics: Diagnostics, has_primvar: Callable[[str], bool]) -> None:
+        """Evaluate at ``time``; ``has_primvar`` tells whether geometry with the material has a primvar of a name."""
+        self._time = time
+        self._diagnostics = diagnostics
+        self._has_primvar = has_primvar
+        self._outputs: dict[Any, Value | Driver] = {}
+        self._depth = 0
+
+    def value(self, attribute: Any) -> Value | Driver | None:
+        """Return the constant that an input is, or what drives it; None where nobody gave it a value."""
+        if not attribute.HasAuthoredConnections():
+            return self._own(attribute)
+        chain, source = _follow(attribute)
+        if source is not None:
+            return self._output(*source)
+        for link in reversed(chain):
+            value = self._own(link)
+            if value is not None:
+                return value
+        problem = _problem(chain)
+        if problem:
+            self._diagnostics.warn("dangling-connection", place(attribute), problem)
+        return None
+
+    def _own(self, attribute: Any) -> Value | None:
+        if not attribute.HasAuthoredValue():
+            return None
+        try:
+            data = attribute.Get(self._time)
+        except (RuntimeError, TypeError):
+            return None
+        return None if data is None else Value(str(attribute.GetTypeName()), data)
+
+    def _output(self, shader: Any, name: str) -> Value | Driver:
+        """Return what an output of a shader is."""
+        path = shader.GetPath().AppendProperty(name)
+        driver = Driver(str(path))
+        known = self._outputs.get(path)
+        if known is not None:
+            return known
+        # A network that leads back here finds a driver, as does one too deep.
+        self._outputs[path] = driver
+        if self._depth < _DEEPEST:
+            self._depth += 1
+            try:
+                self._outputs[path] = self._evaluate(shader, name) or driver
+            except _DrivenError:
+                pass
+            finally:
+                self._depth -= 1
+        return self._outputs[path]
+
+    def _evaluate(self, shader: Any, name: str) -> Value | None:
+        """Return the value of a node's output, None where it has none."""
+
+        def read(input_name: str) -> Value | None:
+            attribute = shader.GetAttribute(tokens.INPUTS_PREFIX + input_name)
+            value = self.value(attribute) if attribute else None
+            if isinstance(value, Driver):
+                raise _DrivenError
+            return value
+
+        identifier = str(UsdShade.Shader(shader).GetShaderId() or "")
+        for prefix, (varname, fallback) in tokens.PRIMVAR_NODES.items():
+            if identifier.startswith(prefix):
+                wanted = read(varname)
+                if wanted is not None and wanted.data and self._has_primvar(str(wanted.data)):
+                    return None
+                return read(fallback) or _zero(identifier[len(prefix) :])
+        node = find_node(identifier, name.removeprefix(tokens.OUTPUTS_PREFIX))
+        return node.evaluate(read) if node else None
+
+
+def _zero(suffix: str) -> Value | None:
+    """Return the fallback of a primvar reader that has none authored: zero of the type that its name ends with."""
+    type_name = tokens.PRIMVAR_READER_TYPES.get(suffix) or tokens.MATERIALX_TYPES.get(suffix)
+    sdf_type = Sdf.ValueTypeNames.Find(type_name) if type_name else None
+    return Value(type_name, sdf_type.defaultValue) if type_name and sdf_type else None
+
+
+def _follow(attribute: Any) -> tuple[list[Any], tuple[Any, str] | None]:
+    """Follow connections through containers, from ``attribute`` to a shader's output.
+
+    Returns the attributes on the way, ``attribute`` first, and the shader with the name of its output; None where the
+    way ends before one.
+    """
+    chain = [attribute]
+    seen = {attribute.GetPath()}
+    while True:
+        here = chain[-1]
+        stage = here.GetStage()
+        for path in here.GetConnections() if here.HasAuthoredConnections() else ():
+            prim = stage.GetPrimAtPath(path.GetPrimPath())
+            if not prim:
+                continue
+            if prim.IsA(UsdShade.NodeGraph):
+                found = prim.GetAttribute(path.name)
+                if found and found.GetPath() not in seen:
+                    chain.append(found)
+                    seen.add(found.GetPath())
+                    break
+            elif path.name.startswith(tokens.OUTPUTS_PREFIX) and UsdShade.ConnectableAPI(prim):
+                return chain, (prim, path.name)
+        else:
+            return chain, None
+
+
+def _problem(chain: list[Any]) -> str | None:
+    """Return what is wrong with a way that ends in nothing; None where it ends in an input without a value."""
+    last = chain[-1]
+    if not last.HasAuthoredConnections():
+        return None
+    seen = {link.GetPath() for link in chain}
+    if any(path in seen for path in last.GetConnections()):
+        return "its connections lead back to themselves; they are ignored"
+    return "the connection leads to no value; it is ignored"
+
+
+def terminal_shader(output: Any) -> Any:
+    """Return the shader prim that a material's output leads to, through wrappers of surfaces; None if to none."""
+    seen = set()
+    while True:
+        _, source = _follow(output)
+        if source is None:
+            return None
+        prim, _ = source
+        shader = UsdShade.Shader(prim)
+        wrapped = _SURFACE_WRAPPERS.get(str(shader.GetShaderId() or "")) if shader else None
+        behind = prim.GetAttribute(tokens.INPUTS_PREFIX + wrapped) if wrapped else None
+        if not behind or not behind.HasAuthoredConnections() or prim.GetPath() in seen:
+            return prim if shader else None
+        seen.add(prim.GetPath())
+        output = behind

@@ -1,0 +1,71 @@
+//! UsdPreviewSurface.
+//!
+//! Specification: OpenUSD `docs/spec_usdpreviewsurface.rst` 2.6; names and defaults: `usdShaders/shaderDefs.usda`
+//! 26.11 and MaterialX 1.39 `usd_preview_surface.mtlx`. It states no dispersion, no absorption and no thin walls.
+
+use crate::diagnostics::Diagnostics;
+use crate::error::Result;
+
+use super::super::THRESHOLD;
+#[cfg(test)]
+use super::inputs::Declared;
+use super::inputs::{Inputs, Number, Switch, Word, input};
+use super::vocabulary::{Glass, Response};
+use super::{Dialect, layered};
+
+const OPACITY: Number = input("opacity", 1.0);
+const OPACITY_MODE: Word = input("opacityMode", "transparent");
+const OPACITY_THRESHOLD: Number = input("opacityThreshold", 0.0);
+const METALLIC: Number = input("metallic", 0.0);
+const USE_SPECULAR_WORKFLOW: Switch = input("useSpecularWorkflow", false);
+const ROUGHNESS: Number = input("roughness", 0.5);
+const IOR: Number = input("ior", 1.5);
+
+pub(super) struct PreviewSurface;
+
+impl Dialect for PreviewSurface {
+    fn ids(&self) -> &'static [&'static str] {
+        &["UsdPreviewSurface", "ND_UsdPreviewSurface_surfaceshader"]
+    }
+
+    #[cfg(test)]
+    fn inputs(&self) -> &'static [Declared] {
+        &[
+            Declared::Number(OPACITY),
+            Declared::Word(OPACITY_MODE),
+            Declared::Number(OPACITY_THRESHOLD),
+            Declared::Number(METALLIC),
+            Declared::Switch(USE_SPECULAR_WORKFLOW),
+            Declared::Number(ROUGHNESS),
+            Declared::Number(IOR),
+        ]
+    }
+
+    /// Opacity under 0.5 is glass in the mode `transparent`, and a hole in the mode `presence` or under a threshold.
+    fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
+        let opacity = inputs.number(OPACITY, diagnostics)?;
+        let threshold = inputs.number(OPACITY_THRESHOLD, diagnostics)?;
+        let is_presence = inputs.word(OPACITY_MODE, &["transparent", "presence"])? == "presence";
+        // With a threshold, what is under it is not rendered and everything else is fully opaque.
+        let limit = if threshold > 0.0 { threshold } else { THRESHOLD };
+        if opacity < limit {
+            if threshold > 0.0 {
+                return Ok(Response::CutOut(format!("opacity {opacity} under opacityThreshold {threshold}")));
+            }
+            if is_presence {
+                return Ok(Response::CutOut(format!("opacity {opacity} in opacityMode presence")));
+            }
+            let rough = inputs.is_rough(ROUGHNESS, diagnostics)?;
+            return Ok(Response::Transmissive { why: format!("opacity {opacity}"), rough, thin_walled: false });
+        }
+        let metalness = inputs.metalness(METALLIC)?;
+        if metalness.value >= THRESHOLD && !inputs.switch(USE_SPECULAR_WORKFLOW, diagnostics)? {
+            return Ok(Response::Metal { why: metalness.to_string(), rough: inputs.is_rough(ROUGHNESS, diagnostics)? });
+        }
+        Ok(Response::Opaque(format!("opacity {opacity}")))
+    }
+
+    fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {
+        layered::glass(inputs, IOR, None, diagnostics)
+    }
+}

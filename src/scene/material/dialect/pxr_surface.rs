@@ -1,0 +1,72 @@
+//! The glass lobe of RenderMan's PxrSurface.
+//!
+//! Names: OpenUSD `third_party/renderman-*/plugin/hdPrman/matfiltConvertPreviewMaterial.cpp` (`refractionGain`, `glassIor`,
+//! `glassRoughness`, `presence`) and Mari's exporter of the node (the others). Meaning, and the default of the index: the
+//! RenderMan documentation, PxrSurface, Glass Parameters. The other defaults are those of RenderMan's own node definition
+//! and were not verified against a public source. It states no dispersion; `extinction` and `ssAlbedo` have no published
+//! formula and are not read.
+
+use crate::diagnostics::Diagnostics;
+use crate::error::Result;
+
+use super::super::THRESHOLD;
+use super::Dialect;
+#[cfg(test)]
+use super::inputs::Declared;
+use super::inputs::{Color, Inputs, Number, Switch, input};
+use super::layered;
+use super::vocabulary::{Glass, Response};
+
+const PRESENCE: Number = input("presence", 1.0);
+const REFRACTION_GAIN: Number = input("refractionGain", 0.0);
+const THIN: Switch = input("thinGlass", false);
+const ROUGHNESS: Number = input("glassRoughness", 0.1);
+const REFRACTION_ROUGHNESS: Number = input("glassRefractionRoughness", -1.0);
+const IOR: Number = input("glassIor", 1.5);
+const EXTINCTION: Color = input("extinction", [0.0; 3]);
+
+pub(super) struct PxrSurface;
+
+impl Dialect for PxrSurface {
+    fn ids(&self) -> &'static [&'static str] {
+        &["PxrSurface"]
+    }
+
+    #[cfg(test)]
+    fn inputs(&self) -> &'static [Declared] {
+        &[
+            Declared::Number(PRESENCE),
+            Declared::Number(REFRACTION_GAIN),
+            Declared::Switch(THIN),
+            Declared::Number(ROUGHNESS),
+            Declared::Number(REFRACTION_ROUGHNESS),
+            Declared::Number(IOR),
+            Declared::Color(EXTINCTION),
+        ]
+    }
+
+    fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
+        if let Some(why) = inputs.cut_out(PRESENCE, diagnostics)? {
+            return Ok(Response::CutOut(why));
+        }
+        let gain = inputs.weight(REFRACTION_GAIN, diagnostics)?;
+        if gain.value < THRESHOLD {
+            return Ok(Response::Opaque(gain.to_string()));
+        }
+        if !layered::is_black(inputs.color(EXTINCTION, diagnostics)?) {
+            inputs.warn_unread(
+                EXTINCTION.name,
+                "the interior of PxrSurface is not read: its glass is clear",
+                diagnostics,
+            );
+        }
+        // Negative: as the reflection.
+        let is_separate = inputs.number(REFRACTION_ROUGHNESS, diagnostics)? >= 0.0;
+        let rough = inputs.is_rough(if is_separate { REFRACTION_ROUGHNESS } else { ROUGHNESS }, diagnostics)?;
+        Ok(Response::Transmissive { why: gain.to_string(), rough, thin_walled: inputs.switch(THIN, diagnostics)? })
+    }
+
+    fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {
+        layered::glass(inputs, IOR, None, diagnostics)
+    }
+}
