@@ -133,7 +133,8 @@ mod tests {
     #[test]
     fn a_line_through_an_edge_crosses_once_or_not_at_all() {
         let cube = Cuboid::new(DVec3::splat(2.0)).expect("a cube");
-        let count = |o: [f64; 3], d: [f64; 3]| cube.borders(o.into(), DVec3::from(d).normalize(), None).as_slice().len();
+        let count =
+            |o: [f64; 3], d: [f64; 3]| cube.borders(o.into(), DVec3::from(d).normalize(), None).as_slice().len();
         assert_eq!(count([0.0, 0.0, -3.0], [0.0, 0.0, 1.0]), 2);
         assert_eq!(count([-1.0, 0.5, -3.0], [0.0, 0.0, 1.0]), 2);
         assert_eq!(count([1.0, 0.5, -3.0], [0.0, 0.0, 1.0]), 0);

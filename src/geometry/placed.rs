@@ -59,7 +59,8 @@ impl Placed {
 
     /// Bounds in render space, outward by the rounding of the transforms; `None` for a shape without extent.
     pub(super) fn bounds(&self) -> Option<Bounds> {
-        let about = |[min, max]: [DVec3; 2]| (self.point(0.5 * (min + max)), absolute(self.linear) * (0.5 * (max - min)));
+        let about =
+            |[min, max]: [DVec3; 2]| (self.point(0.5 * (min + max)), absolute(self.linear) * (0.5 * (max - min)));
         let (center, half) = match &*self.shape {
             Shape::Sphere(sphere) => {
                 // The extent of the ellipsoid L·S² along an axis is the length of that row of L.

@@ -205,9 +205,8 @@ impl Section {
         found: &mut dyn FnMut(f64),
     ) {
         let roots = self.form.roots(line, standing);
-        let valid = |roots: &Roots, i: usize| {
-            roots.cross && roots.sheet[i] >= 0.0 && from < roots.at[i] && roots.at[i] < to
-        };
+        let valid =
+            |roots: &Roots, i: usize| roots.cross && roots.sheet[i] >= 0.0 && from < roots.at[i] && roots.at[i] < to;
         let [first, second] = roots.map_or([None; 2], |r| [0, 1].map(|i| valid(&r, i).then_some(r.at[i])));
         if above[0] == above[1] {
             let middle = 0.5 * (from + to);
@@ -226,7 +225,13 @@ impl Section {
         found(match (first, second) {
             (Some(t), None) | (None, Some(t)) => t,
             // One of them belongs to the neighbour: the one closer to an end.
-            (Some(first), Some(second)) => if first - from < to - second { second } else { first },
+            (Some(first), Some(second)) => {
+                if first - from < to - second {
+                    second
+                } else {
+                    first
+                }
+            }
             // The root is at an end; on which one, the sheet tells.
             (None, None) => {
                 let best = roots.map_or(from, |r| if r.sheet[1] > r.sheet[0] { r.at[1] } else { r.at[0] });

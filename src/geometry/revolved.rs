@@ -52,10 +52,11 @@ fn ring(inner: [f64; 2], outer: [f64; 2]) -> Section {
     Section { form, outer: outer[0], rim: outer[1] }
 }
 
-/// Half a sphere about (0, `center`), below it for `radius` > 0 with sign +1 and above it with sign −1.
-fn hemisphere(center: f64, radius: f64, sign: f64) -> Section {
-    let form = Form::Conic { vertex: center - sign * radius, curvature: sign / radius, kappa: 1.0 };
-    Section { form, outer: radius, rim: center }
+/// Part of a sphere about (0, `center`), from the axis to the distance `outer`: below the centre for `side` +1, above it
+/// for −1.
+fn ball(center: f64, radius: f64, side: f64, outer: [f64; 2]) -> Section {
+    let form = Form::Conic { vertex: center - side * radius, curvature: side / radius, kappa: 1.0 };
+    Section { form, outer: outer[0], rim: outer[1] }
 }
 
 impl Revolved {
@@ -78,22 +79,44 @@ impl Revolved {
         Some(Self::new(axis, lower, upper, bottom.max(top)))
     }
 
-    /// A spine of the length `height` with half spheres of the radii `bottom` and `top` at its ends. The height may be 0,
-    /// and so may one of the radii; `None` unless the rest is positive and everything finite.
+    /// UsdGeom's capsule: a truncated cone with the radii `bottom` and `top` at ∓height/2 along the axis, and the parts of
+    /// spheres at its ends that continue it without an edge; half spheres for equal radii.
+    ///
+    /// The height may be 0 for equal radii, and one of the radii may be 0; `None` unless the rest is positive and
+    /// everything finite.
     pub fn capsule(height: f64, bottom: f64, top: f64, axis: Axis) -> Option<Self> {
         let end = 0.5 * height;
         let is_solid = end >= 0.0 && bottom >= 0.0 && top >= 0.0 && bottom.max(top) > 0.0;
-        if !(is_solid && end.is_finite() && (bottom.max(top) + end).is_finite()) {
+        if !(is_solid && end.is_finite() && bottom.max(top).is_finite()) {
             return None;
         }
-        let mut lower: Vec<Section> = (bottom > 0.0).then(|| hemisphere(-end, bottom, 1.0)).into_iter().collect();
-        let mut upper: Vec<Section> = (top > 0.0).then(|| hemisphere(end, top, -1.0)).into_iter().collect();
-        if bottom < top {
-            lower.push(ring([bottom, -end], [top, end]));
-        } else if top < bottom {
-            upper.push(ring([top, end], [bottom, -end]));
+        let per_height = if bottom.to_bits() == top.to_bits() { 0.0 } else { (top - bottom) / height };
+        // A sphere that touches the cone at the radius r has its centre at r·m along the axis from there.
+        let stretch = (1.0 + per_height * per_height).sqrt();
+        let center = [-end + per_height * bottom, end + per_height * top];
+        let radius = [bottom * stretch, top * stretch];
+        if !center.iter().chain(&radius).all(|x| x.is_finite()) {
+            return None;
         }
-        Some(Self::new(axis, lower, upper, bottom.max(top)))
+        let below = |outer: [f64; 2]| (bottom > 0.0).then(|| ball(center[0], radius[0], 1.0, outer));
+        let above = |outer: [f64; 2]| (top > 0.0).then(|| ball(center[1], radius[1], -1.0, outer));
+        let mut lower: Vec<Section>;
+        let mut upper: Vec<Section>;
+        if bottom < top {
+            lower = below([bottom, -end]).into_iter().collect();
+            lower.push(ring([bottom, -end], [top, end]));
+            lower.push(ball(center[1], radius[1], 1.0, [radius[1], center[1]]));
+            upper = above([radius[1], center[1]]).into_iter().collect();
+        } else if top < bottom {
+            lower = below([radius[0], center[0]]).into_iter().collect();
+            upper = above([top, end]).into_iter().collect();
+            upper.push(ring([top, end], [bottom, -end]));
+            upper.push(ball(center[0], radius[0], -1.0, [radius[0], center[0]]));
+        } else {
+            lower = below([bottom, -end]).into_iter().collect();
+            upper = above([top, end]).into_iter().collect();
+        }
+        Some(Self::new(axis, lower, upper, radius[0].max(radius[1])))
     }
 
     fn new(axis: Axis, lower: Vec<Section>, upper: Vec<Section>, radius: f64) -> Self {
@@ -192,13 +215,10 @@ impl Revolved {
     /// Where the line changes its side of a profile within the `span` inside the cylinder.
     fn changes(&self, line: &Line, span: [f64; 2], is_upper: bool, standing: Option<u32>) -> Changes {
         let sections = if is_upper { &self.upper } else { &self.lower };
-        let Some(outermost) = sections.last() else {
-            unreachable!("both profiles reach from the axis to the radius")
-        };
+        let Some(outermost) = sections.last() else { unreachable!("both profiles reach from the axis to the radius") };
         let is_above = |t: f64, rim: f64| line.height(t) > rim;
         let ends = span.map(|t| is_above(t, outermost.rim));
-        let mut changes =
-            Changes { items: [Change { at: 0.0, primitive: 0 }; 12], len: 0, above: ends[0] };
+        let mut changes = Changes { items: [Change { at: 0.0, primitive: 0 }; 12], len: 0, above: ends[0] };
         // Inwards until a circle is not reached, then outwards again.
         let mut outside = (span, ends);
         let mut far = [(span[1], ends[1]); MAX_SECTIONS];
@@ -279,7 +299,9 @@ impl Revolved {
                 // The other sheet of a sphere or a cone is far from the profile's.
                 let height = sections[i].form.height(r.clamp(inner, sections[i].outer));
                 let size = self.radius.max(sections[i].outer);
-                r >= inner - error && r <= sections[i].outer + error && (p.z - height).abs() <= size * HALF_DIGITS + error
+                r >= inner - error
+                    && r <= sections[i].outer + error
+                    && (p.z - height).abs() <= size * HALF_DIGITS + error
             }
             None => {
                 let rim = |sections: &[Section]| sections.last().map_or(0.0, |s| s.rim);

@@ -274,17 +274,29 @@ mod tests {
         // Inside, whether the way in is computed behind, here or ahead.
         for here in [-tiny, 0.0, tiny] {
             assert_eq!(found(&[(here, 0, false), (2.0, 1, true)], true), Some((2.0, 1, true)));
-            assert_eq!(found(&[(here, 0, false), (2.0, 1, true), (3.0, 2, false), (4.0, 3, true)], true), Some((2.0, 1, true)));
+            assert_eq!(
+                found(&[(here, 0, false), (2.0, 1, true), (3.0, 2, false), (4.0, 3, true)], true),
+                Some((2.0, 1, true))
+            );
         }
         // At a rim: the way out through the neighbour is here, computed ahead or behind.
-        assert_eq!(found(&[(-1.0, 2, false), (tiny, 1, true), (3.0, 2, false), (4.0, 3, true)], true), Some((tiny, 1, true)));
-        assert_eq!(found(&[(-1.0, 2, false), (-tiny, 1, true), (3.0, 2, false), (4.0, 3, true)], true), Some((0.0, 1, true)));
+        assert_eq!(
+            found(&[(-1.0, 2, false), (tiny, 1, true), (3.0, 2, false), (4.0, 3, true)], true),
+            Some((tiny, 1, true))
+        );
+        assert_eq!(
+            found(&[(-1.0, 2, false), (-tiny, 1, true), (3.0, 2, false), (4.0, 3, true)], true),
+            Some((0.0, 1, true))
+        );
         assert_eq!(found(&[(-1.0, 2, false), (-tiny, 1, true)], true), Some((0.0, 1, true)));
         assert_eq!(found(&[], true), None);
         // Outside, after the event here, wherever it was computed.
         for here in [-tiny, 0.0, tiny] {
             assert_eq!(found(&[(-2.0, 1, false), (here, 0, true)], false), None);
-            assert_eq!(found(&[(-2.0, 1, false), (here, 0, true), (3.0, 2, false), (4.0, 3, true)], false), Some((3.0, 2, false)));
+            assert_eq!(
+                found(&[(-2.0, 1, false), (here, 0, true), (3.0, 2, false), (4.0, 3, true)], false),
+                Some((3.0, 2, false))
+            );
         }
         assert_eq!(found(&[], false), None);
         // In a hollow rim: the neighbour is entered here.

@@ -181,9 +181,9 @@ impl Start<'_> {
         let error = UNIT_ROUNDOFF * START_ERRORS * self.magnitude;
         let standing = match self.last() {
             Some((crossing, is_last)) => Some((crossing.primitive, !crossing.outward, is_last)),
-            None => solid.piece_at(origin, error, |_| true).map(|primitive| {
-                (primitive, self.arrival.dot(solid.piece(primitive, origin).gradient) > 0.0, false)
-            }),
+            None => solid
+                .piece_at(origin, error, |_| true)
+                .map(|primitive| (primitive, self.arrival.dot(solid.piece(primitive, origin).gradient) > 0.0, false)),
         };
         let border = match standing {
             None => solid.borders(origin, direction, None).ahead()?,

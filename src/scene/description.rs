@@ -137,15 +137,15 @@ pub enum Shape {
         /// `X`, `Y` or `Z`.
         axis: String,
     },
-    /// A truncated cone between half spheres, about the origin.
+    /// A truncated cone about the origin that spheres continue without an edge at both ends.
     Capsule {
         /// Prim path.
         path: String,
-        /// Along the axis, half spheres excluded.
+        /// Along the axis, without what the spheres add.
         height: f64,
-        /// Of the half sphere at −height/2.
+        /// Of the truncated cone at −height/2.
         radius_bottom: f64,
-        /// Of the half sphere at +height/2.
+        /// Of the truncated cone at +height/2.
         radius_top: f64,
         /// `X`, `Y` or `Z`.
         axis: String,

@@ -10,7 +10,10 @@ pub(super) fn compile(shape: &Shape) -> Result<Option<Solid>> {
     let (path, sizes) = sizes(shape);
     for &(name, size) in &sizes {
         if !(size >= 0.0 && size.is_finite()) {
-            return Err(Error::scene(format!("{path}.{name}"), format!("is {size}: it must be finite and not negative")));
+            return Err(Error::scene(
+                format!("{path}.{name}"),
+                format!("is {size}: it must be finite and not negative"),
+            ));
         }
     }
     if is_empty(shape) {
@@ -46,7 +49,9 @@ fn sizes(shape: &Shape) -> (&str, Vec<(&'static str, f64)>) {
         // Prims of the older schemas have one radius.
         let radii = [("radius", bottom), ("radiusBottom", bottom), ("radiusTop", top)];
         let is_one = bottom.to_bits() == top.to_bits();
-        std::iter::once(("height", height)).chain(if is_one { radii[..1].to_vec() } else { radii[1..].to_vec() }).collect()
+        std::iter::once(("height", height))
+            .chain(if is_one { radii[..1].to_vec() } else { radii[1..].to_vec() })
+            .collect()
     };
     match *shape {
         Shape::Cube { ref path, size } => (path, vec![("size", size)]),

@@ -87,7 +87,7 @@ fn solids_bend_as_they_say() {
             solid(Revolved::cylinder(1.5, 0.9, 0.0, axis)),
             solid(Revolved::cylinder(1.5, 0.4, 0.9, axis)),
             solid(Revolved::capsule(0.5, 0.7, 0.7, axis)),
-            solid(Revolved::capsule(0.5, 0.9, 0.6, axis)),
+            solid(Revolved::capsule(1.5, 0.9, 0.6, axis)),
         ];
         for shape in &shapes {
             for place in [DAffine3::IDENTITY, DAffine3::from_scale(DVec3::splat(-0.3)), skew()] {

@@ -90,7 +90,13 @@ def solid_bounds(shape: dict[str, Any]) -> tuple[tuple[float, float, float], tup
     bottom = abs(values.get("radius_bottom", values.get("radius", 0.0)))
     top = abs(values.get("radius_top", values.get("radius", 0.0)))
     end, around = abs(values["height"]) / 2, max(bottom, top)
-    low, high = (-end - bottom, end + top) if kind == "capsule" else (-end, end)
+    low, high = -end, end
+    if kind == "capsule":
+        # Spheres that touch the truncated cone at its ends.
+        slope = (top - bottom) / (2 * end) if top != bottom and end > 0 else 0.0
+        stretch = math.hypot(1.0, slope)
+        low, high = -end + bottom * (slope - stretch), end + top * (slope + stretch)
+        around *= stretch
     spine = tokens.AXES.index(values["axis"])
     lowest, highest = [-around] * 3, [around] * 3
     lowest[spine], highest[spine] = low, high
