@@ -82,7 +82,7 @@ impl Line {
         }
         let discriminant = (radius - self.nearest) * (radius + self.nearest);
         let half = (discriminant / self.across).sqrt();
-        (discriminant > 0.0).then(|| [self.at_nearest - half, self.at_nearest + half])
+        (discriminant > 0.0).then_some([self.at_nearest - half, self.at_nearest + half])
     }
 
     /// Height at a distance along the line.
@@ -172,7 +172,7 @@ impl Form {
                 let gradient = DVec3::new(2.0 * c * p.x, 2.0 * c * p.y, 2.0 * (c * kappa * zeta - 1.0));
                 let bend = if c == 0.0 {
                     Bend::Plane
-                } else if kappa == 1.0 {
+                } else if kappa.to_bits() == 1.0_f64.to_bits() {
                     Bend::Sphere(2.0 * c)
                 } else {
                     Bend::Quadric(DMat3::from_diagonal(DVec3::new(2.0 * c, 2.0 * c, 2.0 * c * kappa)))

@@ -45,7 +45,7 @@ fn plane(height: f64, outer: f64) -> Section {
 /// From the circle (r, z) = `inner` to the circle `outer`, further out.
 fn ring(inner: [f64; 2], outer: [f64; 2]) -> Section {
     let per_height = (outer[0] - inner[0]) / (outer[1] - inner[1]);
-    if inner[1] == outer[1] || !per_height.is_finite() {
+    if !per_height.is_finite() {
         return plane(outer[1], outer[0]);
     }
     let form = Form::Cone { height: outer[1], radius: outer[0], per_height };
@@ -132,7 +132,7 @@ impl Revolved {
 
     pub(super) fn bounds(&self) -> [DVec3; 2] {
         let r = self.radius;
-        [DVec3::new(-r, -r, self.bottom), DVec3::new(r, r, self.top)].map(|p| self.axis.from_z(p))
+        [DVec3::new(-r, -r, self.bottom), DVec3::new(r, r, self.top)].map(|p| self.axis.turned_back(p))
     }
 
     /// Pieces of the surface, numbered along the profile: the lower sections from the axis outwards, the cylinder around, the
@@ -159,7 +159,7 @@ impl Revolved {
     }
 
     pub(super) fn borders(&self, origin: DVec3, direction: DVec3, standing: Option<u32>) -> Borders {
-        let (origin, direction) = (self.axis.to_z(origin), self.axis.to_z(direction));
+        let (origin, direction) = (self.axis.turned_to_z(origin), self.axis.turned_to_z(direction));
         // Seen from the point next to the middle the numbers are as small as the solid; a ray on its surface is there.
         let moved = if standing.is_some() { 0.0 } else { -origin.dot(direction) };
         let line = Line::new(origin + moved * direction, direction);
@@ -201,7 +201,7 @@ impl Revolved {
 
     /// How far a ray that starts on the piece runs to meet it again; 0 if it does not.
     pub(super) fn chord(&self, origin: DVec3, direction: DVec3, primitive: u32) -> f64 {
-        let line = Line::new(self.axis.to_z(origin), self.axis.to_z(direction));
+        let line = Line::new(self.axis.turned_to_z(origin), self.axis.turned_to_z(direction));
         let end = match self.section(primitive) {
             None => line.within(self.radius, true).map(|ends| ends[1]),
             Some((is_upper, i)) => {
@@ -251,7 +251,7 @@ impl Revolved {
     }
 
     pub(super) fn piece(&self, primitive: u32, p: DVec3) -> Piece {
-        let p = self.axis.to_z(p);
+        let p = self.axis.turned_to_z(p);
         let (value, gradient, bend) = match self.section(primitive) {
             // Inside is above the lower profile, where Q < 0, and below the upper one.
             Some((false, i)) => self.lower[i].form.equation(p),
@@ -273,24 +273,24 @@ impl Revolved {
         };
         let bend = match bend {
             Bend::Quadric(h) => {
-                let turn = |v: DVec3| self.axis.from_z(v);
-                let basis = [DVec3::X, DVec3::Y, DVec3::Z].map(|e| turn(h * self.axis.to_z(e)));
+                let turn = |v: DVec3| self.axis.turned_back(v);
+                let basis = [DVec3::X, DVec3::Y, DVec3::Z].map(|e| turn(h * self.axis.turned_to_z(e)));
                 Bend::Quadric(DMat3::from_cols(basis[0], basis[1], basis[2]))
             }
             other => other,
         };
-        Piece { value, gradient: self.axis.from_z(gradient), bend }
+        Piece { value, gradient: self.axis.turned_back(gradient), bend }
     }
 
     /// The normal at the tip of a cone, which has none: along the axis.
     pub(super) fn tip_normal(&self, primitive: u32) -> DVec3 {
         let is_upper = self.section(primitive).is_some_and(|(is_upper, _)| is_upper);
-        self.axis.from_z(if is_upper { DVec3::Z } else { DVec3::NEG_Z })
+        self.axis.turned_back(if is_upper { DVec3::Z } else { DVec3::NEG_Z })
     }
 
     /// Whether the piece is where `p` is, up to `error`, if its surface passes there.
     pub(super) fn covers(&self, primitive: u32, p: DVec3, error: f64) -> bool {
-        let p = self.axis.to_z(p);
+        let p = self.axis.turned_to_z(p);
         let r = p.truncate().length();
         match self.section(primitive) {
             Some((is_upper, i)) => {

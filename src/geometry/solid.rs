@@ -54,7 +54,7 @@ impl Axis {
     }
 
     /// Turns the axes so that this one becomes z.
-    pub(super) fn to_z(self, v: DVec3) -> DVec3 {
+    pub(super) fn turned_to_z(self, v: DVec3) -> DVec3 {
         match self {
             Self::X => DVec3::new(v.y, v.z, v.x),
             Self::Y => DVec3::new(v.z, v.x, v.y),
@@ -62,8 +62,8 @@ impl Axis {
         }
     }
 
-    /// The inverse of [`Self::to_z`].
-    pub(super) fn from_z(self, v: DVec3) -> DVec3 {
+    /// The inverse of [`Self::turned_to_z`].
+    pub(super) fn turned_back(self, v: DVec3) -> DVec3 {
         match self {
             Self::X => DVec3::new(v.z, v.x, v.y),
             Self::Y => DVec3::new(v.y, v.z, v.x),
