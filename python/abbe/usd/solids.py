@@ -76,7 +76,7 @@ def _number(prim: Any, name: str, time: Any) -> float:
 
 
 def solid_bounds(shape: dict[str, Any]) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
-    """Return the lowest and highest corner of a solid in object space, as UsdGeom computes its extent; None for others."""
+    """Return the corners of a solid's box in object space, as UsdGeom computes its extent; None for other shapes."""
     ((kind, values),) = shape.items()
     if kind == "cube":
         half = abs(values["size"]) / 2
