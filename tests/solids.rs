@@ -8,7 +8,7 @@ mod support;
 use abbe::integrator::chain::{Counters, End, Follower, Record};
 use abbe::ray::{ColumnSet, NoColumns, RayStart, SecondOrderColumns};
 use abbe::scene::Scene;
-use abbe::scene::description::Shape;
+use abbe::scene::description::{Lens, LensFace, Shape};
 use abbe::scene::view::{Media, View};
 use abbe::spectrum::Wavelength;
 use glam::{DMat4, DVec3};
@@ -27,6 +27,22 @@ fn scene(shape: Shape, transform: DMat4) -> Scene {
     s.build()
 }
 
+fn lens(front: (f64, f64, &[f64]), back: (f64, f64, &[f64])) -> Shape {
+    let face = |(curvature, conic, aspheres): (f64, f64, &[f64])| LensFace {
+        curvature,
+        conic,
+        aspheres: aspheres.to_vec(),
+        semi_diameter: 1.0,
+    };
+    Shape::Lens(Lens {
+        path: "/World/Solid".into(),
+        front: face(front),
+        back: face(back),
+        thickness: 0.7,
+        edge_radius: Some(1.1),
+    })
+}
+
 fn solids() -> Vec<(&'static str, Shape)> {
     let path = || "/World/Solid".to_owned();
     let axis = || "Y".to_owned();
@@ -39,6 +55,9 @@ fn solids() -> Vec<(&'static str, Shape)> {
             "tapered capsule",
             Shape::Capsule { path: path(), height: 0.6, radius_bottom: 1.0, radius_top: 0.7, axis: axis() },
         ),
+        ("biconvex lens", lens((0.4, 0.0, &[]), (-0.3, 0.0, &[]))),
+        ("conic meniscus", lens((-0.4, -1.7, &[]), (-0.6, 0.3, &[]))),
+        ("aspheric lens", lens((0.5, -0.6, &[0.05, -0.02]), (0.2, 0.0, &[-0.04, 0.01, 0.002]))),
         ("cube", Shape::Cube { path: path(), size: 1.6 }),
     ]
 }

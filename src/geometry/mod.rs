@@ -11,6 +11,7 @@
 //! Limits: object-space points between about 1e-37 and 1e37 in size keep all this; f32 has no digits below.
 
 mod aggregate;
+mod asphere;
 mod buffer;
 mod cuboid;
 mod departures;
@@ -38,7 +39,7 @@ pub use cuboid::{Cuboid, Rectangle};
 pub use departures::Departures;
 pub use mesh::{Mesh, MeshReport};
 pub use polygons::{Interpolation, PolygonMesh, PrimvarView};
-pub use revolved::Revolved;
+pub use revolved::{Cap, Revolved};
 pub use solid::{Axis, Solid};
 pub use sphere::Sphere;
 

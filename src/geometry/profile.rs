@@ -8,23 +8,27 @@
 //! cone    z = z0 + (r − r0)/m                     Q = ±(r² − w²),  w = r0 + m (z − z0)               sheet: w ≥ 0
 //! ```
 //!
-//! with the curvature c, 0 for a plane, and the conic constant k (0 a sphere, −1 a paraboloid).
+//! with the curvature c, 0 for a plane, and the conic constant k (0 a sphere, −1 a paraboloid). Even aspheres have a file
+//! of their own (`asphere.rs`).
 
 use glam::{DMat3, DVec3};
 
+use super::asphere::{Asphere, Sag};
 use super::solid::Bend;
 
 /// The equation of a piece.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Form {
     /// A cap about the axis; a plane where the curvature is 0.
     Conic { vertex: f64, curvature: f64, kappa: f64 },
     /// Part of a cone: `radius` at the height `height`, changing by `per_height` ≠ 0.
     Cone { height: f64, radius: f64, per_height: f64 },
+    /// A cap with terms of higher order.
+    Asphere(Asphere),
 }
 
 /// A form between the outer radius of the piece before it and its own.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Section {
     pub(super) form: Form,
     pub(super) outer: f64,
@@ -85,6 +89,36 @@ impl Line {
         (discriminant > 0.0).then_some([self.at_nearest - half, self.at_nearest + half])
     }
 
+    /// Whether it leads anywhere but along the axis.
+    pub(super) fn moves_across(&self) -> bool {
+        self.across >= f64::MIN_POSITIVE
+    }
+
+    /// r² at a distance along the line.
+    pub(super) fn square(&self, t: f64) -> f64 {
+        self.start + t * self.mean_rate(t)
+    }
+
+    /// Its derivative.
+    pub(super) fn rate(&self, t: f64) -> f64 {
+        2.0 * (self.across * t + self.slope)
+    }
+
+    /// The mean of the derivative from the origin to there.
+    pub(super) fn mean_rate(&self, t: f64) -> f64 {
+        self.across * t + 2.0 * self.slope
+    }
+
+    /// Half the second derivative.
+    pub(super) fn across(&self) -> f64 {
+        self.across
+    }
+
+    /// Where the line is nearest to the axis.
+    pub(super) fn nearest_point(&self) -> f64 {
+        self.at_nearest
+    }
+
     /// Height at a distance along the line.
     pub(super) fn height(&self, t: f64) -> f64 {
         // ∞ · 0 is no number, and a line that does not rise stays where it is.
@@ -101,10 +135,11 @@ impl Form {
                 vertex + curvature * r * r / (1.0 + root)
             }
             Self::Cone { height, radius, per_height } => height + (r - radius) / per_height,
+            Self::Asphere(ref asphere) => asphere.vertex + asphere.sag(r * r).value,
         }
     }
 
-    /// Crossings of the line. If it stands on the piece, 0 is one of them.
+    /// Crossings of the line with a quadric. If it stands on the piece, 0 is one of them.
     pub(super) fn roots(&self, line: &Line, standing: bool) -> Option<Roots> {
         let Line { origin, direction, across, slope, start, .. } = *line;
         // a t² + 2 b t + c = 0.
@@ -120,6 +155,7 @@ impl Form {
                 let r = start.sqrt();
                 (across - dw * dw, slope - w * dw, (r - w) * (r + w))
             }
+            Self::Asphere(_) => return None,
         };
         let c = if standing { 0.0 } else { c };
         let discriminant = b * b - a * c;
@@ -138,6 +174,7 @@ impl Form {
             _ if !t.is_finite() => f64::NEG_INFINITY,
             Self::Conic { vertex, curvature, kappa } => 1.0 - kappa * curvature * (line.height(t) - vertex),
             Self::Cone { height, radius, per_height } => radius + per_height * (line.height(t) - height),
+            Self::Asphere(_) => f64::NEG_INFINITY,
         });
         Some(Roots { at, sheet, cross })
     }
@@ -158,6 +195,7 @@ impl Form {
                 }
                 self.equation(p).0
             }
+            Self::Asphere(_) => self.equation(p).0,
         };
         value < 0.0
     }
@@ -187,6 +225,21 @@ impl Form {
                 let hessian = DMat3::from_diagonal(DVec3::new(2.0, 2.0, -2.0 * m * m));
                 (sign * (r - w) * (r + w), sign * gradient, Bend::Quadric(sign * hessian))
             }
+            Self::Asphere(ref asphere) => {
+                // Q = 2 (σ − ζ), of the size of the conic's.
+                let Sag { value, first, second, third } = asphere.sag(square);
+                let gradient = DVec3::new(4.0 * first * p.x, 4.0 * first * p.y, -2.0);
+                let r = square.sqrt();
+                // At the axis every direction is radial.
+                let radial = if r > 0.0 { DVec3::new(p.x / r, p.y / r, 0.0) } else { DVec3::X };
+                let bend = Bend::Revolved {
+                    radial,
+                    around: DVec3::new(-radial.y, radial.x, 0.0),
+                    second: [4.0 * first + 8.0 * second * square, 4.0 * first],
+                    third: [r * (24.0 * second + 16.0 * third * square), 8.0 * r * second],
+                };
+                (2.0 * (value - (p.z - asphere.vertex)), gradient, bend)
+            }
         }
     }
 }
@@ -204,6 +257,9 @@ impl Section {
         standing: bool,
         found: &mut dyn FnMut(f64),
     ) {
+        if let Form::Asphere(asphere) = &self.form {
+            return asphere.changes(line, [from, to], above, standing, found);
+        }
         let roots = self.form.roots(line, standing);
         let valid =
             |roots: &Roots, i: usize| roots.cross && roots.sheet[i] >= 0.0 && from < roots.at[i] && roots.at[i] < to;

@@ -7,6 +7,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::asphere::Asphere;
 use super::profile::{Form, Line, Section};
 use super::solid::{Axis, Bend, Border, Borders, Piece};
 
@@ -23,6 +24,50 @@ pub struct Revolved {
     top: f64,
 }
 
+/// One face of a lens: a conic and terms of higher order, in light's own direction +z.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cap {
+    /// 1/r at the vertex, positive if the centre is on the side of +z; 0 for a plane.
+    pub curvature: f64,
+    /// The conic constant k: 0 a sphere, −1 a paraboloid.
+    pub conic: f64,
+    /// Coefficients of r⁴, r⁶, r⁸, ….
+    pub aspheres: Vec<f64>,
+    /// Radius up to which the face has this form; beyond it is flat.
+    pub semi_diameter: f64,
+}
+
+impl Cap {
+    fn section(&self, vertex: f64, what: &str) -> Result<Section, String> {
+        let Self { curvature, conic, ref aspheres, semi_diameter: outer } = *self;
+        if !(outer > 0.0 && outer.is_finite()) {
+            return Err(format!("the semi-diameter of the {what} is {outer}: it must be positive and finite"));
+        }
+        if ![curvature, conic].iter().chain(aspheres).all(|x| x.is_finite()) {
+            return Err(format!("the {what} has a coefficient that is not finite"));
+        }
+        let kappa = 1.0 + conic;
+        let reach = kappa * (curvature * outer) * (curvature * outer);
+        let is_conic = aspheres.iter().all(|&a| a == 0.0);
+        // A half sphere may end at its equator, whatever rounding says of 1/r · r.
+        let limit = if is_conic { 1.0 + 4.0 * f64::EPSILON } else { 1.0 - f64::EPSILON };
+        if reach > limit {
+            return Err(format!(
+                "the {what} of curvature {curvature} and conic constant {conic} ends at the radius {}: its semi-diameter {outer} \
+                 must be smaller",
+                1.0 / (kappa.sqrt() * curvature.abs())
+            ));
+        }
+        let form = if is_conic {
+            Form::Conic { vertex, curvature, kappa }
+        } else {
+            Form::Asphere(Asphere::new(vertex, curvature, kappa, aspheres.clone(), outer))
+        };
+        let rim = form.height(outer);
+        Ok(Section { form, outer, rim })
+    }
+}
+
 /// A change of side along a line.
 #[derive(Clone, Copy)]
 struct Change {
@@ -32,7 +77,7 @@ struct Change {
 
 /// Changes of side of one profile, in order.
 struct Changes {
-    items: [Change; 12],
+    items: [Change; MAX_CHANGES],
     len: usize,
     /// Whether the line begins above.
     above: bool,
@@ -119,11 +164,50 @@ impl Revolved {
         Some(Self::new(axis, lower, upper, radius[0].max(radius[1])))
     }
 
+    /// A lens along z with the vertex of its front at the origin and that of its back at z = `thickness`, both faces flat
+    /// from their semi-diameters to the `edge` radius, where a cylinder joins them.
+    ///
+    /// # Errors
+    ///
+    /// What does not make a solid: sizes that are not positive, a face that ends before its semi-diameter, faces that cross.
+    pub fn lens(front: &Cap, back: &Cap, thickness: f64, edge: f64) -> Result<Self, String> {
+        if !(thickness > 0.0 && thickness.is_finite()) {
+            return Err(format!("the thickness is {thickness}: it must be positive and finite"));
+        }
+        let widest = front.semi_diameter.max(back.semi_diameter);
+        if !(edge >= widest && edge.is_finite()) {
+            return Err(format!("the edge radius is {edge}: it must be at least the larger semi-diameter, {widest}"));
+        }
+        let profile = |cap: &Cap, vertex: f64, what: &str| {
+            let cap = cap.section(vertex, what)?;
+            let flat = (cap.outer < edge).then(|| plane(cap.rim, edge));
+            Ok::<_, String>(std::iter::once(cap).chain(flat).collect::<Vec<_>>())
+        };
+        let (lower, upper) = (profile(front, 0.0, "front")?, profile(back, thickness, "back")?);
+        // Faces that cross between two of these radii leave a solid all the same: what is between them.
+        let gap = |r: f64| {
+            let height =
+                |sections: &[Section]| sections.iter().find(|s| r <= s.outer).map_or(0.0, |s| s.form.height(r));
+            height(&upper) - height(&lower)
+        };
+        for i in 0..=GAPS {
+            let r = edge * f64::from(i) / f64::from(GAPS);
+            if gap(r) < 0.0 {
+                return Err(format!("front and back cross at the radius {r}: make it thicker, or the edge smaller"));
+            }
+        }
+        Ok(Self::new(Axis::Z, lower, upper, edge))
+    }
+
     fn new(axis: Axis, lower: Vec<Section>, upper: Vec<Section>, radius: f64) -> Self {
-        // Every section rises or falls all the way.
         let ends = |sections: &[Section]| -> Vec<f64> {
             let axis = sections.first().map(|s| s.form.height(0.0));
-            sections.iter().map(|s| s.rim).chain(axis).collect()
+            // An asphere may turn between its ends; all other sections rise or fall all the way.
+            let turning = sections.iter().filter_map(|s| match &s.form {
+                Form::Asphere(asphere) => Some(asphere.extremes()),
+                Form::Conic { .. } | Form::Cone { .. } => None,
+            });
+            sections.iter().map(|s| s.rim).chain(axis).chain(turning.flatten()).collect()
         };
         let bottom = ends(&lower).into_iter().fold(f64::INFINITY, f64::min);
         let top = ends(&upper).into_iter().fold(f64::NEG_INFINITY, f64::max);
@@ -218,7 +302,7 @@ impl Revolved {
         let Some(outermost) = sections.last() else { unreachable!("both profiles reach from the axis to the radius") };
         let is_above = |t: f64, rim: f64| line.height(t) > rim;
         let ends = span.map(|t| is_above(t, outermost.rim));
-        let mut changes = Changes { items: [Change { at: 0.0, primitive: 0 }; 12], len: 0, above: ends[0] };
+        let mut changes = Changes { items: [Change { at: 0.0, primitive: 0 }; MAX_CHANGES], len: 0, above: ends[0] };
         // Inwards until a circle is not reached, then outwards again.
         let mut outside = (span, ends);
         let mut far = [(span[1], ends[1]); MAX_SECTIONS];
@@ -261,6 +345,9 @@ impl Revolved {
                     Bend::Plane => Bend::Plane,
                     Bend::Sphere(s) => Bend::Sphere(-s),
                     Bend::Quadric(hessian) => Bend::Quadric(-hessian),
+                    Bend::Revolved { radial, around, second, third } => {
+                        Bend::Revolved { radial, around, second: second.map(|x| -x), third: third.map(|x| -x) }
+                    }
                 };
                 (-value, -gradient, bend)
             }
@@ -277,7 +364,13 @@ impl Revolved {
                 let basis = [DVec3::X, DVec3::Y, DVec3::Z].map(|e| turn(h * self.axis.turned_to_z(e)));
                 Bend::Quadric(DMat3::from_cols(basis[0], basis[1], basis[2]))
             }
-            other => other,
+            Bend::Revolved { radial, around, second, third } => Bend::Revolved {
+                radial: self.axis.turned_back(radial),
+                around: self.axis.turned_back(around),
+                second,
+                third,
+            },
+            other @ (Bend::Plane | Bend::Sphere(_)) => other,
         };
         Piece { value, gradient: self.axis.turned_back(gradient), bend }
     }
@@ -311,6 +404,10 @@ impl Revolved {
     }
 }
 
+/// Changes of side along one line at most.
+const MAX_CHANGES: usize = 16;
+/// Radii at which the faces of a lens are compared.
+const GAPS: i32 = 1024;
 /// Sections of one profile at most.
 const MAX_SECTIONS: usize = 3;
 /// A sphere's height at its equator answers an error of its radius with the square root: half of the digits.
@@ -318,7 +415,7 @@ const HALF_DIGITS: f64 = 1.0 / 16_777_216.0;
 
 impl Changes {
     fn push(&mut self, change: Change) {
-        // Two changes for each of five stretches at most.
+        // Two changes for each of five stretches, and a few more for an asphere that waves.
         if let Some(item) = self.items.get_mut(self.len) {
             *item = change;
             self.len += 1;

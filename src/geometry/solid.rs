@@ -14,7 +14,7 @@ use super::cuboid::{Cuboid, Rectangle};
 use super::revolved::Revolved;
 
 /// Borders that one line can have; more than any solid here makes.
-const CAPACITY: usize = 32;
+const CAPACITY: usize = 40;
 
 /// An analytic solid, or a piece of a plane.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,6 +105,14 @@ pub(super) enum Bend {
     /// H = s I: a sphere of radius |∇F|/|s|, convex for s > 0.
     Sphere(f64),
     Quadric(DMat3),
+    /// A surface of revolution with F_zz = 0 and no mixed derivatives in z: along the unit vectors `radial` and `around`,
+    /// F_rr and F_tt, F_rrr and F_rtt.
+    Revolved {
+        radial: DVec3,
+        around: DVec3,
+        second: [f64; 2],
+        third: [f64; 2],
+    },
 }
 
 impl Borders {

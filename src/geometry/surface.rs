@@ -108,6 +108,12 @@ impl Placed {
             }
             (Bend::Sphere(s), None) => quadric(DMat3::from_diagonal(DVec3::splat(s))),
             (Bend::Quadric(hessian), _) => quadric(hessian),
+            (Bend::Revolved { radial, around, second, third }, _) => {
+                let (radial, around) = (self.covector(radial), self.covector(around));
+                let gradient = outer(radial * second[0], radial) + outer(around * second[1], around);
+                let field = NormalField::Revolved { vector, radial, around, second, third };
+                (Curvature::Quadric { hessian: gradient * length.recip() }, field)
+            }
         };
         (point, LocalSurface { n_g, n_s: n_g, curvature, field })
     }

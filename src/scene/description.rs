@@ -150,6 +150,8 @@ pub enum Shape {
         /// `X`, `Y` or `Z`.
         axis: String,
     },
+    /// A lens element, traced as its prescription says.
+    Lens(Lens),
     /// A polygon mesh.
     Mesh(Mesh),
 }
@@ -164,9 +166,44 @@ impl Shape {
             | Self::Cylinder { path, .. }
             | Self::Cone { path, .. }
             | Self::Capsule { path, .. } => path,
+            Self::Lens(lens) => &lens.path,
             Self::Mesh(mesh) => &mesh.path,
         }
     }
+}
+
+/// A lens element about the z axis: the front vertex at the origin, the back vertex at z = thickness.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lens {
+    /// Prim path.
+    pub path: String,
+    /// The face at the origin.
+    pub front: LensFace,
+    /// The face at z = thickness.
+    pub back: LensFace,
+    /// Between the vertices.
+    pub thickness: f64,
+    /// Of the cylinder that joins the faces; the larger semi-diameter if absent.
+    #[serde(default)]
+    pub edge_radius: Option<f64>,
+}
+
+/// One face of a lens.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LensFace {
+    /// 1/radius, positive if the centre is on the side of +z.
+    #[serde(default)]
+    pub curvature: f64,
+    /// The conic constant: 0 a sphere, −1 a paraboloid.
+    #[serde(default)]
+    pub conic: f64,
+    /// Coefficients of r⁴, r⁶, r⁸, ….
+    #[serde(default)]
+    pub aspheres: Vec<f64>,
+    /// Up to which the face has this form; beyond it is flat.
+    pub semi_diameter: f64,
 }
 
 /// A polygon mesh as authored.

@@ -1,12 +1,15 @@
 //! Analytic solids from their descriptions: sizes are checked, and what has none is left out.
 
-use super::description::Shape;
+use super::description::{Lens, LensFace, Shape};
 use crate::error::{Error, Result};
-use crate::geometry::{Axis, Cuboid, Rectangle, Revolved, Solid};
+use crate::geometry::{Axis, Cap, Cuboid, Rectangle, Revolved, Solid};
 use glam::DVec3;
 
 /// The solid of a description; `None` if a size is 0, so that there is nothing to see. Not for spheres and meshes.
 pub(super) fn compile(shape: &Shape) -> Result<Option<Solid>> {
+    if let Shape::Lens(lens) = shape {
+        return compile_lens(lens).map(Some);
+    }
     let (path, sizes) = sizes(shape);
     for &(name, size) in &sizes {
         if !(size >= 0.0 && size.is_finite()) {
@@ -37,10 +40,23 @@ pub(super) fn compile(shape: &Shape) -> Result<Option<Solid>> {
         Shape::Capsule { height, radius_bottom, radius_top, axis: ref token, .. } => {
             Revolved::capsule(height, radius_bottom, radius_top, axis(token)?).map(Solid::Revolved)
         }
-        Shape::Sphere { .. } | Shape::Mesh(_) => None,
+        Shape::Sphere { .. } | Shape::Lens(_) | Shape::Mesh(_) => None,
     };
     let listed = || sizes.iter().map(|(name, size)| format!("{name} {size}")).collect::<Vec<_>>().join(", ");
     solid.map(Some).ok_or_else(|| Error::scene(path, format!("{}: there is no such solid in doubles", listed())))
+}
+
+fn compile_lens(lens: &Lens) -> Result<Solid> {
+    let cap = |face: &LensFace| Cap {
+        curvature: face.curvature,
+        conic: face.conic,
+        aspheres: face.aspheres.clone(),
+        semi_diameter: face.semi_diameter,
+    };
+    let edge = lens.edge_radius.unwrap_or(lens.front.semi_diameter.max(lens.back.semi_diameter));
+    Revolved::lens(&cap(&lens.front), &cap(&lens.back), lens.thickness, edge)
+        .map(Solid::Revolved)
+        .map_err(|problem| Error::scene(&lens.path, format!("is no lens: {problem}")))
 }
 
 /// The prim path and the sizes under their USD names.
@@ -62,6 +78,7 @@ fn sizes(shape: &Shape) -> (&str, Vec<(&'static str, f64)>) {
             (path, round(height, radius_bottom, radius_top))
         }
         Shape::Sphere { ref path, radius } => (path, vec![("radius", radius)]),
+        Shape::Lens(ref lens) => (&lens.path, vec![]),
         Shape::Mesh(ref mesh) => (&mesh.path, vec![]),
     }
 }
@@ -74,6 +91,6 @@ fn is_empty(shape: &Shape) -> bool {
         Shape::Cone { height, radius, .. } => height.min(radius) <= 0.0,
         Shape::Cylinder { height, radius_bottom, radius_top, .. } => height.min(radius_bottom.max(radius_top)) <= 0.0,
         Shape::Capsule { radius_bottom, radius_top, .. } => radius_bottom.max(radius_top) <= 0.0,
-        Shape::Sphere { .. } | Shape::Mesh(_) => false,
+        Shape::Sphere { .. } | Shape::Lens(_) | Shape::Mesh(_) => false,
     }
 }

@@ -33,6 +33,10 @@ fn predicted(surface: &LocalSurface, q: DVec3) -> (DVec3, f64) {
             let s = gradient * q;
             (s - surface.n_s * surface.n_s.dot(s)) / vector.length()
         }
+        NormalField::Revolved { vector, radial, around, second, .. } => {
+            let s = radial * (second[0] * radial.dot(q)) + around * (second[1] * around.dot(q));
+            (s - surface.n_s * surface.n_s.dot(s)) / vector.length()
+        }
     };
     let kappa = match surface.curvature {
         Curvature::Plane => 0.0,
