@@ -16,6 +16,7 @@ from ..errors import StageError
 from . import tokens
 from ._pxr import Usd, UsdGeom
 from .description import Array, ArrayTable, Diagnostics
+from .lenses import lens_bounds, read_lens
 from .solids import read_solid, solid_bounds
 from .values import float_array, int_array, place, read
 
@@ -57,6 +58,10 @@ class ShapeReader:
         """Return the index of the shape of a cube, plane, cylinder, cone or capsule."""
         return self._shared(prim, source, lambda prim: read_solid(prim, self._time))
 
+    def lens(self, prim: Any, source: Any) -> int | None:
+        """Return the index of the shape of a prim with a lens prescription."""
+        return self._shared(prim, source, lambda prim: read_lens(prim, self._time))
+
     def mesh(self, prim: Any, source: Any) -> int | None:
         """Return the index of the shape of a ``Mesh`` prim; None (with a warning) if it has nothing to render."""
         return self._shared(prim, source, self._read_mesh)
@@ -67,7 +72,7 @@ class ShapeReader:
         if sphere is not None:
             radius = abs(sphere["radius"])
             return (-radius, -radius, -radius), (radius, radius, radius)
-        solid = solid_bounds(self.shapes[shape])
+        solid = solid_bounds(self.shapes[shape]) or lens_bounds(self.shapes[shape])
         if solid is not None:
             return solid
         points = self.arrays[self.shapes[shape]["mesh"]["points"]]

@@ -20,6 +20,7 @@ from ._pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 from .cameras import find_camera, framed_camera, read_camera
 from .description import Description, Diagnostics
 from .geometry import ShapeReader
+from .lenses import is_lens
 from .materials import MaterialReader
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
@@ -47,6 +48,7 @@ class _Kind(enum.Enum):
     MESH = enum.auto()
     SPHERE = enum.auto()
     SOLID = enum.auto()
+    LENS = enum.auto()
     CAMERA = enum.auto()
     LIGHT = enum.auto()
     UNSUPPORTED = enum.auto()
@@ -149,6 +151,9 @@ class _Walk:
                 continue
             state = self._inherit(prim, facts, parent)
             states.append(state)
+            if kind is _Kind.LENS:
+                # What stands below is what other software draws in its place.
+                prims.PruneChildren()
             if kind is _Kind.INSTANCER:
                 # Its prototypes usually stand below it and are not drawn where they stand.
                 prims.PruneChildren()
@@ -162,6 +167,8 @@ class _Walk:
         kind = self._kinds.get(type_name)
         if kind is None:
             kind = self._kinds[type_name] = _classify(prim)
+        if kind in (_Kind.MESH, _Kind.PASS_THROUGH) and is_lens(prim):
+            kind = _Kind.LENS
         attribute = prim.GetAttribute(tokens.PURPOSE)
         authored = bool(attribute) and attribute.HasAuthoredValue()
         return _Facts(
@@ -200,6 +207,8 @@ class _Walk:
             self._place(prim, path, self.shapes.mesh(prim, source), state)
         elif kind is _Kind.SPHERE:
             self._place(prim, path, self.shapes.sphere(prim, source), state)
+        elif kind is _Kind.LENS:
+            self._place(prim, path, self.shapes.lens(prim, source), state)
         elif kind is _Kind.SOLID:
             self._place(prim, path, self.shapes.solid(prim, source), state)
         elif kind is _Kind.SKELETAL:

@@ -191,6 +191,21 @@ MATERIAL_NAMES: Final = {
     "abbe:internalTransmittance:thickness": "double",
     "abbe:dielectricPriority": "int",
 }
+LENS_THICKNESS: Final = "abbe:lens:thickness"
+LENS_EDGE_RADIUS: Final = "abbe:lens:edgeRadius"
+LENS_PREFIX: Final = "abbe:lens:"
+LENS_NAMES: Final = {
+    "abbe:lens:thickness": "double",
+    "abbe:lens:edgeRadius": "double",
+    "abbe:lens:front:curvature": "double",
+    "abbe:lens:front:conic": "double",
+    "abbe:lens:front:aspheres": "double[]",
+    "abbe:lens:front:semiDiameter": "double",
+    "abbe:lens:back:curvature": "double",
+    "abbe:lens:back:conic": "double",
+    "abbe:lens:back:aspheres": "double[]",
+    "abbe:lens:back:semiDiameter": "double",
+}
 SETTINGS_NAMES: Final = {
     "abbe:integrator": "token",
     "abbe:samples": "int",
