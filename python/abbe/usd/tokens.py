@@ -191,6 +191,7 @@ MATERIAL_NAMES: Final = {
     "abbe:internalTransmittance:thickness": "double",
     "abbe:dielectricPriority": "int",
 }
+SCALAR_IOR: Final = "abbe:scalarIor"
 SETTINGS_NAMES: Final = {
     "abbe:integrator": "token",
     "abbe:samples": "int",
@@ -201,7 +202,7 @@ SETTINGS_NAMES: Final = {
     "abbe:dispersionScale": "double",
     "abbe:seed": "int",
     "abbe:seedPerFrame": "bool",
-    "abbe:scalarIor": "token",
+    SCALAR_IOR: "token",
     "abbe:pixelFilter": "token",
     "abbe:pixelFilterWidth": "float",
     "abbe:channelWavelengths": "double3",
