@@ -2,7 +2,7 @@
 # .venv/ and the cargo target folder are reused, so a second run does only what changed.
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-rust test-python lint lint-rust lint-python fmt bench stress wheel clean
+.PHONY: help build demo test test-rust test-python test-oldest-usd lint lint-rust lint-python fmt bench stress wheel clean
 
 # The oldest interpreter that is there: the wheel is built against 3.11 and serves every later one.
 PYTHON ?= $(firstword $(foreach p,python3.11 python3.12 python3.13 python3.14 python3,$(if $(shell $(p) --version 2>/dev/null),$(p))))
@@ -12,6 +12,9 @@ TOOLS := $(VENV)/.tools.stamp
 EXTENSION := $(VENV)/.extension.stamp
 WHEEL := dist/.wheel.stamp
 OUT := out
+# The oldest USD that pyproject.toml promises, in an environment of its own.
+OLDEST_USD := $(shell sed -n 's/^usd = \["usd-core>=\(.*\)"\]$$/\1/p' pyproject.toml)
+OLDEST := $(VENV)/usd-$(OLDEST_USD)
 
 # maturin and pyo3 look for the interpreter here, whichever shell calls make.
 export VIRTUAL_ENV := $(VENV)
@@ -28,6 +31,7 @@ help:
 	@echo 'make build   the package with everything, in .venv'
 	@echo 'make demo    build, install into .venv, render stages/prism.usda to $(OUT)/, check it, write a preview'
 	@echo 'make test    every test: Rust, documentation, Python, the wheel in an empty environment'
+	@echo 'make test-oldest-usd   tests of everything that meets USD, with the oldest version promised'
 	@echo 'make lint    formatting, clippy, rustdoc, ruff, mypy'
 	@echo 'make fmt     format everything'
 	@echo 'make bench   speed and error against time'
@@ -65,7 +69,7 @@ demo: $(EXTENSION)
 	$(BIN)/abbe check $(OUT)/prism.exr
 	@echo 'Look at $(OUT)/prism.png; $(OUT)/prism.exr has every layer.'
 
-test: test-rust test-python
+test: test-rust test-python test-oldest-usd
 
 # nextest runs faster where somebody installed it; it has no documentation tests.
 test-rust:
@@ -80,6 +84,22 @@ test-python: $(EXTENSION) $(WHEEL)
 	cargo build --quiet --bin abbe-render
 	ABBE_WHEEL="$$(ls $(CURDIR)/dist/*.whl)" ABBE_RENDER="$(abspath $(or $(CARGO_TARGET_DIR),target))/debug/abbe-render" \
 	  $(BIN)/python -m pytest
+
+$(OLDEST)/.stamp: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m venv $(OLDEST)
+	$(OLDEST)/bin/python -m pip install --quiet --only-binary :all: usd-core==$(OLDEST_USD) 'numpy>=1.26' 'pytest>=8'
+	@touch $@
+
+# All that meets USD. Its wheels end with Python 3.12; on a later one this is skipped, and says so.
+test-oldest-usd: $(EXTENSION)
+	@if $(BIN)/python -c 'import sys; sys.exit(sys.version_info >= (3, 13))'; then \
+	  $(MAKE) --no-print-directory $(OLDEST)/.stamp && echo 'pytest with USD $(OLDEST_USD)' && \
+	  PYTHONPATH=$(CURDIR)/python $(OLDEST)/bin/python -m pytest -q -p no:cacheprovider \
+	    tests/python/test_plugin.py tests/python/test_registration.py tests/python/test_validators.py \
+	    tests/python/test_bridge_*.py; \
+	else \
+	  echo 'SKIPPED: usd-core $(OLDEST_USD), the oldest that abbe promises to work with, has no wheel for this Python'; \
+	fi
 
 lint: lint-rust lint-python
 

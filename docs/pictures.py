@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image
 
 import abbe
+from abbe.glass_plot import write_plot
 from abbe.preview import write_preview
 
 HERE = Path(__file__).parent
@@ -137,7 +138,12 @@ def layers() -> None:
         write_preview(film, IMAGES / f"{stage}_layers.png")
 
 
-PICTURES = {make.__name__: make for make in (prism, gem, composite, layers)}
+def glass() -> None:
+    """Curves of a glass, as `abbe glass show --plot` draws them."""
+    write_plot(IMAGES / "glass.png", abbe.glass("SCHOTT:N-SF11"))
+
+
+PICTURES = {make.__name__: make for make in (prism, gem, composite, layers, glass)}
 
 if __name__ == "__main__":
     IMAGES.mkdir(exist_ok=True)

@@ -131,11 +131,14 @@ def joined(blocks: Iterable[list[str]]) -> list[str]:
 # --- prims ------------------------------------------------------------------------------------------------------------
 
 
-def glass(name: str, label: str, priority: int) -> list[str]:
-    """A glass: its law in our attributes, and a preview surface that says it is clear."""
-    b, c = GLASSES[label]
+def glass(name: str, label: str, priority: int, form: str = "coefficients") -> list[str]:
+    """A glass, and a preview surface that says it is clear.
+
+    Its law stands in our attributes as "coefficients", or is named there as one of the "catalogue", or stands in a
+    "shader" of our own, which only we look for.
+    """
     path = f"/World/Looks/{name}"
-    shader = block(
+    preview = block(
         'def Shader "Surface"',
         [
             'uniform token info:id = "UsdPreviewSurface"',
@@ -146,16 +149,27 @@ def glass(name: str, label: str, priority: int) -> list[str]:
             "token outputs:surface",
         ],
     )
-    lines = [
+    connection = f"token outputs:surface.connect = <{path}/Surface.outputs:surface>"
+    if form == "shader":
+        law = [line.removeprefix("uniform ").replace(" abbe:", " inputs:abbe:") for line in stated(label, priority)]
+        ours = block('def Shader "Glass"', ['uniform token info:id = "AbbeGlass"', *law, "token outputs:surface"])
+        ours = [f"token outputs:abbe:surface.connect = <{path}/Glass.outputs:surface>", connection, "", *ours]
+        return block(f'def Material "{name}"', [*ours, "", *preview])
+    named = [f'uniform string abbe:glass = "SCHOTT:{label}"', f"uniform int abbe:dielectricPriority = {priority}"]
+    law = named if form == "catalogue" else stated(label, priority)
+    lines = [*law, connection, "", *preview]
+    return block(f'def Material "{name}"', lines, ['prepend apiSchemas = ["AbbeDispersionAPI"]'])
+
+
+def stated(label: str, priority: int) -> list[str]:
+    """Sellmeier's law of a glass by its coefficients."""
+    b, c = GLASSES[label]
+    return [
         'uniform token abbe:dispersion:law = "sellmeier"',
         f"uniform double[] abbe:dispersion:sellmeier:b = {doubles(b)}",
         f"uniform double[] abbe:dispersion:sellmeier:c = {doubles(c)}",
         f"uniform int abbe:dielectricPriority = {priority}",
-        f"token outputs:surface.connect = <{path}/Surface.outputs:surface>",
-        "",
-        *shader,
     ]
-    return block(f'def Material "{name}"', lines, ['prepend apiSchemas = ["AbbeDispersionAPI"]'])
 
 
 def paint(name: str, color: Vector, emission: float = 0.0) -> list[str]:
@@ -538,14 +552,15 @@ def ball() -> str:
         ),
     ]
     looks = [
-        glass("NBK7", "N-BK7", 1),
+        glass("NBK7", "N-BK7", 1, "catalogue"),
         paint("White", (0.8, 0.8, 0.8)),
         paint("Ink", (0.05, 0.05, 0.06)),
         paint("Red", (0.6, 0.08, 0.05)),
     ]
     doc = """A ball lens of N-BK7, an analytic sphere of 60 mm, over a striped floor before a chequered backdrop.
     Look for: the world upside down in the ball; `dispersion` small in the middle and growing towards the rim, pointing
-    along the radius, where `dispersion2` and the exact `dispersion_r` and `dispersion_b` part from the first order."""
+    along the radius, where `dispersion2` and the exact `dispersion_r` and `dispersion_b` part from the first order.
+    The glass is named, and comes from the catalogue."""
     return stage("ball", doc, "0.01", looks, prims)
 
 
@@ -867,7 +882,7 @@ def gem() -> str:
         mesh("Tent", tent_points, tent_faces, "Grey", decimals=4, subsets=panels, is_double_sided=True),
     ]
     looks = [
-        glass("Diamond", "Diamond", 1),
+        glass("Diamond", "Diamond", 1, "shader"),
         paint("Black", (0.02, 0.02, 0.02)),
         paint("Slate", (0.05, 0.05, 0.06)),
         paint("Grey", (0.2, 0.2, 0.2)),
@@ -879,7 +894,7 @@ def gem() -> str:
     {GEM_CROWN_ANGLE:g} degrees, pavilion {GEM_PAVILION_ANGLE:g} degrees, table {100 * GEM_TABLE:g} %;
     it floats over a dark floor in a tent of panels. Look for: fire. After two or more total reflections `dispersion`
     and `dispersion_footprint` differ from facet to facet by orders of magnitude; `total_reflections` draws the facets
-    of the pavilion, and `footprint_half_width` tells where the first order ends."""
+    of the pavilion, and `footprint_half_width` tells where the first order ends. The diamond is an AbbeGlass."""
     return stage("gem", doc, "0.001", looks, prims)
 
 

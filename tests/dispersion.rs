@@ -605,12 +605,21 @@ fn tables_that_cannot_be_read_say_what_to_do() {
         (&[[-400.0, 1.5], [700.0, 1.49]], "the wavelength -400 nm: it must be positive"),
         (&[[400.0, f64::NAN], [700.0, 1.49]], "finite"),
         (&[[400.0, 1.5], [f64::INFINITY, 1.49]], "finite"),
-        (&[[400.0, 0.0], [700.0, 1.49]], "at 400 nm the index is 0, it must lie between 0.01 and 100"),
-        (&[[400.0, 150.0], [700.0, 1.49]], "at 400 nm the index is 150"),
+        (&[[400.0, 0.0], [700.0, 1.49]], "has the index 0 at 400 nm: it must be positive"),
+        (&[[400.0, 1.5], [700.0, -1.49]], "has the index -1.49 at 700 nm"),
     ] {
         let problem = Law::table(entries).unwrap_err();
         assert!(problem.contains(remedy), "{problem}");
     }
+    let problem = refused(Law::table(&[[400.0, 150.0], [700.0, 1.49]]));
+    assert!(
+        problem.contains("the index is 150.000000 at 400.000 nm") || problem.contains("at 360.000 nm"),
+        "{problem}"
+    );
+    assert!(problem.contains("the table is off there") && !problem.contains("coefficients"), "{problem}");
+    // Aluminium has n > 100 beyond 33 µm, which no visible light asks for.
+    let aluminium = [[400.0, 0.49], [500.0, 0.77], [600.0, 1.2], [900.0, 2.1], [33_000.0, 102.0]];
+    assert!(Dispersion::new(Law::table(&aluminium).unwrap(), None, OutOfRange::Clamp).is_ok());
     let endless: Vec<_> = (0..70_000).map(|i| [300.0 + f64::from(i), 1.5]).collect();
     assert!(Law::table(&endless).unwrap_err().contains("at most 65536"));
 }

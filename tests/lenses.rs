@@ -273,7 +273,6 @@ fn lens_systems_agree_with_the_sequential_trace() {
     ];
     for (name, system, aim) in systems {
         let (worst, compared) = compare(&system, aim);
-        println!("{name}: p {:.1e}, p_λ {:.1e}, d_λ {:.1e} over {compared} rays", worst[0], worst[1], worst[2]);
         assert!(compared >= 40, "{name}: only {compared} rays went the prescription's way");
         assert!(worst[0] < 1e-13 && worst[1] < 1e-9 && worst[2] < 1e-9, "{name}: {worst:?}");
     }

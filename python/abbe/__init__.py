@@ -15,6 +15,7 @@ from __future__ import annotations
 from . import schemas as _schemas
 from ._api import Plan, Progress, Scene, integrators, merge, render
 from ._core import Film, __version__
+from .catalog import Glass, glass, glasses, nearest_glass
 from .errors import AbbeError, StageError, UsageError, UsdMissingError
 from .optics import Dispersion, Reflected, Refracted, Transferred, reflect, refract, transfer
 
@@ -22,6 +23,7 @@ __all__ = [
     "AbbeError",
     "Dispersion",
     "Film",
+    "Glass",
     "Plan",
     "Progress",
     "Reflected",
@@ -32,8 +34,11 @@ __all__ = [
     "UsageError",
     "UsdMissingError",
     "__version__",
+    "glass",
+    "glasses",
     "integrators",
     "merge",
+    "nearest_glass",
     "reflect",
     "refract",
     "render",

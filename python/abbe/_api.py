@@ -142,6 +142,7 @@ class Scene:
         overrides: Mapping[str, Any] | Sequence[str] = (),
         search_paths: Sequence[str | os.PathLike[str]] = (),
         missing: str = "warn",
+        scalar_ior: str | None = None,
         strict: bool = False,
     ) -> Scene:
         """Load a USD stage.
@@ -158,6 +159,7 @@ class Scene:
         overrides : values such as ``"/World/Glass.inputs:ior=1.6"``, or a mapping from attribute path to value
         search_paths : folders in which relative asset paths are looked up after the stage's own
         missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+        scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
         strict : a stage without a camera is an error
 
         Returns
@@ -187,6 +189,7 @@ class Scene:
             overrides=overrides,
             search_paths=search_paths,
             missing=missing,
+            scalar_ior=scalar_ior,
             strict=strict,
         )
         return cls(_core.Scene(description.to_json(), description.arrays))
@@ -401,6 +404,7 @@ def render(
     overrides: Mapping[str, Any] | Sequence[str] = (),
     search_paths: Sequence[str | os.PathLike[str]] = (),
     missing: str = "warn",
+    scalar_ior: str | None = None,
     strict: bool = False,
     progress: Callable[[Progress], object] | None = None,
 ) -> _core.Film:
@@ -427,7 +431,7 @@ def render(
     threads : all of the machine's if None
     crop : x0, y0, x1, y1 in pixels, half-open, y down
     sample_range : begin and end, half-open: a part that :func:`merge` joins with others
-    purposes, variants, overrides, search_paths, missing : as for :meth:`Scene.from_stage`
+    purposes, variants, overrides, search_paths, missing, scalar_ior : as for :meth:`Scene.from_stage`
     strict : what would be a warning about the request, or a missing camera, is an error
     progress : called about ten times a second; ``print`` will do
 
@@ -459,6 +463,7 @@ def render(
         overrides=overrides,
         search_paths=search_paths,
         missing=missing,
+        scalar_ior=scalar_ior,
         strict=strict,
     )
     # The bridge has chosen camera and product already.

@@ -61,15 +61,15 @@ def _plugin_findings() -> list[Finding]:
     files = ("plugInfo.json", "generatedSchema.usda", f"{SHADER}.usda")
     missing = [name for name in files if not (folder / name).is_file()]
     if missing:
-        return [Finding("plug-in", "broken", f"{folder} lacks {', '.join(missing)}: install abbe again")]
+        return [Finding("schemas", "broken", f"{folder} lacks {', '.join(missing)}: install abbe again")]
     try:
         importlib.import_module("pxr.Usd")
     except ImportError:
-        return [Finding("plug-in", "ok", f"{folder}, no USD to register it with")]
+        return [Finding("schemas", "ok", f"{folder}, no USD to register it with")]
     known = schemas_are_known()
-    remedy = "known to USD" if known else f"not known to USD: set PXR_PLUGINPATH_NAME={folder}"
+    text = f"known to USD, {folder}" if known else f"not known to USD: set PXR_PLUGINPATH_NAME={folder}"
     return [
-        Finding("plug-in", "ok" if known else "broken", f"schemas {remedy}, {folder}"),
+        Finding("schemas", "ok" if known else "broken", text),
         _shader_finding(),
         _validators_finding(),
     ]
@@ -117,6 +117,7 @@ def examine() -> list[Finding]:
         Finding("NumPy", "ok", f"{np.__version__}, {Path(np.__file__).parent}"),
         _usd_finding(),
         *_plugin_findings(),
+        _optional("MaterialX", "MaterialX", "mtlx", "for .mtlx references", lambda mx: str(mx.getVersionString())),
         _optional("OpenImageIO", "OpenImageIO", "check", "for abbe check", lambda oiio: str(oiio.VERSION_STRING)),
         _optional("Pillow", "PIL", "preview", "for --preview", lambda pil: str(pil.__version__)),
         _optional(

@@ -7,7 +7,7 @@ parameter the incoming derivatives are by. The code is the renderer's.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,8 @@ from .errors import UsageError
 __all__ = ["Dispersion", "Reflected", "Refracted", "Transferred", "reflect", "refract", "transfer"]
 
 FloatArray = npt.NDArray[np.float64]
+Range = tuple[float, float]
+OutOfRange = Literal["clamp", "error", "extrapolate"]
 
 # How far a vector's length may be from 1: float32 input is good to 6e-8 in each component; more is a vector that nobody
 # normalised.
@@ -49,37 +51,167 @@ class Dispersion:
         return cls(_core.Dispersion.constant(ior))
 
     @classmethod
-    def cauchy(cls, a: float, b_um2: float, c_um4: float = 0.0) -> Dispersion:
-        """Return Cauchy's law n = a + b/λ² + c/λ⁴ with λ in µm.
+    def cauchy(
+        cls,
+        a: float,
+        b_um2: float,
+        c_um4: float = 0.0,
+        *higher: float,
+        valid_range: Range | None = None,
+        out_of_range: OutOfRange = "clamp",
+    ) -> Dispersion:
+        """Return Cauchy's law n = a + b/λ² + c/λ⁴ + … with λ in µm.
 
         Parameters
         ----------
         a : index for long wavelengths
         b_um2 : µm²
         c_um4 : µm⁴
+        higher : further coefficients, µm⁶, µm⁸ …
+        valid_range, out_of_range : see :meth:`formula`
 
         Raises
         ------
         UsageError
             The index leaves 0.01 to 100 somewhere in 360 to 830 nm.
         """
-        return cls(_core.Dispersion.cauchy([a, b_um2, c_um4] if c_um4 != 0.0 else [a, b_um2]))
+        return cls(_core.Dispersion.cauchy([a, b_um2, c_um4, *higher], valid_range, out_of_range))
 
     @classmethod
-    def sellmeier(cls, b: Sequence[float], c_um2: Sequence[float]) -> Dispersion:
+    def sellmeier(
+        cls,
+        b: Sequence[float],
+        c_um2: Sequence[float],
+        *,
+        valid_range: Range | None = None,
+        out_of_range: OutOfRange = "clamp",
+    ) -> Dispersion:
         """Return Sellmeier's law n² = 1 + Σ bᵢ λ² / (λ² − cᵢ) with λ in µm.
 
         Parameters
         ----------
         b : strengths
         c_um2 : squares of the resonance wavelengths, µm² (not squared again), as many
+        valid_range, out_of_range : see :meth:`formula`
 
         Raises
         ------
         UsageError
             There is a pole in 360 to 830 nm, or the lists differ in length.
         """
-        return cls(_core.Dispersion.sellmeier(list(b), list(c_um2)))
+        return cls(_core.Dispersion.sellmeier(list(b), list(c_um2), valid_range, out_of_range))
+
+    @classmethod
+    def schott(
+        cls,
+        coefficients: Sequence[float],
+        *,
+        valid_range: Range | None = None,
+        out_of_range: OutOfRange = "clamp",
+    ) -> Dispersion:
+        """Return Schott's polynomial n² = a₀ + a₁λ² + a₂λ⁻² + a₃λ⁻⁴ + a₄λ⁻⁶ + a₅λ⁻⁸ with λ in µm.
+
+        Parameters
+        ----------
+        coefficients : a₀, a₁ in µm⁻², a₂ in µm², a₃ in µm⁴ …; as many as there are
+        valid_range, out_of_range : see :meth:`formula`
+
+        Raises
+        ------
+        UsageError
+            The index leaves 0.01 to 100 somewhere in 360 to 830 nm.
+        """
+        return cls(_core.Dispersion.schott(list(coefficients), valid_range, out_of_range))
+
+    @classmethod
+    def conrady(
+        cls,
+        a: float,
+        b_um: float,
+        c_um3_5: float = 0.0,
+        *,
+        valid_range: Range | None = None,
+        out_of_range: OutOfRange = "clamp",
+    ) -> Dispersion:
+        """Return Conrady's law n = a + b/λ + c/λ^3.5 with λ in µm.
+
+        Parameters
+        ----------
+        a : index for long wavelengths
+        b_um : µm
+        c_um3_5 : µm to the power of 3.5
+        valid_range, out_of_range : see :meth:`formula`
+
+        Raises
+        ------
+        UsageError
+            The index leaves 0.01 to 100 somewhere in 360 to 830 nm.
+        """
+        return cls(_core.Dispersion.conrady([a, b_um, c_um3_5], valid_range, out_of_range))
+
+    @classmethod
+    def formula(
+        cls,
+        number: int,
+        coefficients: Sequence[float],
+        *,
+        valid_range: Range | None = None,
+        out_of_range: OutOfRange = "clamp",
+    ) -> Dispersion:
+        """Return a formula of refractiveindex.info with its coefficients in the order of that database, λ in µm.
+
+        1 Sellmeier (poles squared), 2 Sellmeier-2 (poles in µm²), 3 polynomial, 4 RefractiveIndex.INFO, 5 Cauchy,
+        6 gases, 7 Herzberger, 8 retro, 9 exotic; sums may have any number of terms.
+
+        Parameters
+        ----------
+        number : 1 to 9
+        coefficients : C1, C2 …
+        valid_range : shortest and longest wavelength in nm for which the law holds; everywhere if None
+        out_of_range : what becomes of other wavelengths: ``"clamp"`` takes the index of the nearest end and derivatives
+            of 0, ``"error"`` refuses them, ``"extrapolate"`` uses the law as it stands
+
+        Raises
+        ------
+        UsageError
+            There is no such formula, the number of coefficients does not fit, there is a pole or an index outside of
+            0.01 to 100 in the part of 360 to 830 nm where the law is used, or the valid range lacks 587.5618 nm, at
+            which n_d is stated (but for ``"extrapolate"``).
+        """
+        return cls(_core.Dispersion.formula(number, list(coefficients), valid_range, out_of_range))
+
+    @classmethod
+    def table(
+        cls,
+        wavelength: npt.ArrayLike,
+        ior: npt.ArrayLike,
+        *,
+        valid_range: Range | None = None,
+        out_of_range: OutOfRange = "clamp",
+    ) -> Dispersion:
+        """Return the curve through measured indices: a cubic spline (not-a-knot), continuous to the second derivative.
+
+        The second derivative is the spline's; :attr:`curvature_doubt` says how far it can be trusted.
+
+        Parameters
+        ----------
+        wavelength : nm, increasing, two or more
+        ior : as many indices
+        valid_range : from end to end of the table if None, else within it; see :meth:`formula`
+        out_of_range : see :meth:`formula`
+
+        Raises
+        ------
+        UsageError
+            The wavelengths do not increase or look like µm, the two differ in length, or the spline leaves 0.01 to 100.
+        """
+        columns = [np.asarray(values, dtype=np.float64) for values in (wavelength, ior)]
+        if columns[0].ndim != 1 or columns[0].shape != columns[1].shape:
+            shapes = " and ".join(str(column.shape) for column in columns)
+            raise UsageError(
+                f"Dispersion.table: wavelength and ior have shapes {shapes}: two equally long lists are wanted"
+            )
+        return cls(_core.Dispersion.table(np.stack(columns, axis=1).tolist(), valid_range, out_of_range))
 
     @classmethod
     def abbe(cls, nd: float, vd: float) -> Dispersion:
@@ -128,6 +260,11 @@ class Dispersion:
         Returns
         -------
         float or float64 array of that shape
+
+        Raises
+        ------
+        UsageError
+            A wavelength is not positive, or outside of the valid range of a law made with ``out_of_range="error"``.
         """
         return self._at(wavelength, 0)
 
@@ -141,8 +278,26 @@ class Dispersion:
 
     @property
     def abbe_number(self) -> float | None:
-        """(n_d − 1)/(n_F − n_C); None for a constant index."""
+        """(n_d − 1)/(n_F − n_C); None for a constant index, and if a line lies outside of the valid range."""
         return self._core.abbe_number
+
+    @property
+    def valid_range(self) -> Range | None:
+        """Shortest and longest wavelength in nm for which the law holds; None if everywhere."""
+        return self._core.valid_range
+
+    @property
+    def out_of_range(self) -> str:
+        """What becomes of wavelengths outside of it: ``"clamp"``, ``"error"`` or ``"extrapolate"``."""
+        return self._core.out_of_range
+
+    @property
+    def curvature_doubt(self) -> float | None:
+        """Relative change of a table's ∂²n/∂λ² when every second entry is left out; None if that cannot be told.
+
+        Root mean squares over 360 to 830 nm; 0.1 means that the second derivative is good to about a tenth.
+        """
+        return self._core.curvature_doubt
 
     @property
     def is_constant(self) -> bool:

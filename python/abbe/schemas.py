@@ -15,14 +15,15 @@ takes longer to import than all the rest. Reading a stage needs none of the thre
 from __future__ import annotations
 
 import importlib
-import importlib.abc
 import sys
 import warnings
 from collections.abc import Callable, Sequence
-from importlib.machinery import ModuleSpec
 from pathlib import Path
-from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from importlib.machinery import ModuleSpec
+    from types import ModuleType
 
 __all__ = ["SHADER", "plugin_path", "register", "register_shader", "schemas_are_known"]
 
@@ -62,8 +63,11 @@ def register() -> None:
             action()
 
 
-class _Afterwards(importlib.abc.MetaPathFinder):
-    """Calls a function after a module was imported; how it is found and loaded is left to the other finders."""
+class _Afterwards:
+    """Calls a function after a module was imported; how it is found and loaded is left to the other finders.
+
+    A finder by what it does: importing the base class would take 10 ms.
+    """
 
     def __init__(self, actions: dict[str, Callable[[], None]]) -> None:
         self._actions = actions
@@ -190,7 +194,11 @@ def register_shader() -> str:
     if insistent(lambda: registry.GetShaderNodeByIdentifier(SHADER)):
         return ""
     path = str(plugin_path() / f"{SHADER}.usda")
-    stage = usd.Stage.Open(path)
+    try:
+        stage = usd.Stage.Open(path)
+    except tf.ErrorException:
+        # Whoever asked for USD's registry must get it.
+        return f"{path} cannot be read: install abbe again"
     results = getattr(shade.ShaderDefUtils, "GetDiscoveryResults", None) or shade.ShaderDefUtils.GetNodeDiscoveryResults
     for result in results(shade.Shader(stage.GetPrimAtPath(f"/{SHADER}")), path):
         registry.AddDiscoveryResult(result)

@@ -4,6 +4,7 @@
 
 use pyo3::prelude::*;
 
+mod catalog;
 mod error;
 mod film;
 mod json;
@@ -19,6 +20,8 @@ mod _core {
     use super::*;
     use crate::error::{Outcome, released};
 
+    #[pymodule_export]
+    use crate::catalog::{PyGlass, glass, glass_database, glasses, nearest_glass};
     #[pymodule_export]
     use crate::film::PyFilm;
     #[pymodule_export]

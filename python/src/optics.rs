@@ -1,6 +1,7 @@
 //! The optics and the calculus alone, on flat NumPy arrays; shapes and broadcasting are Python's (`abbe/optics.py`).
 
 use abbe::Error;
+use abbe::optics::dispersion::{Law, OutOfRange, ValidRange};
 use abbe::optics::{self, IorJet};
 use abbe::ray::standalone;
 use abbe::spectrum::Wavelength;
@@ -17,11 +18,31 @@ pub(crate) struct PyDispersion {
     law: optics::Dispersion,
 }
 
+impl PyDispersion {
+    pub(crate) fn of(law: optics::Dispersion) -> Self {
+        Self { law }
+    }
+}
+
 fn made(by: &str, law: Result<optics::Dispersion, String>) -> Outcome<PyDispersion> {
     match law {
         Ok(law) => Ok(PyDispersion { law }),
         Err(problem) => Err(Error::usage(format!("Dispersion.{by}"), problem).into()),
     }
+}
+
+/// Where a law holds, as Python has it.
+type Range = Option<(f64, f64)>;
+
+/// A law that holds in `valid_range` (nm).
+fn ranged(by: &str, law: Result<Law, String>, valid_range: Range, out_of_range: &str) -> Outcome<PyDispersion> {
+    let Some(out_of_range) = OutOfRange::parse(out_of_range) else {
+        let problem = format!("'{out_of_range}' is unknown: use clamp, error or extrapolate");
+        return Err(Error::usage("out_of_range", problem).into());
+    };
+    let valid = valid_range
+        .map(|(from, to)| ValidRange { from: Wavelength::from_nanometers(from), to: Wavelength::from_nanometers(to) });
+    made(by, law.and_then(|law| optics::Dispersion::new(law, valid, out_of_range)))
 }
 
 type Column<'py> = Bound<'py, PyArray1<f64>>;
@@ -37,14 +58,44 @@ impl PyDispersion {
 
     /// n = A + B/λ² + C/λ⁴ + …, λ in µm.
     #[staticmethod]
-    fn cauchy(coefficients: Vec<f64>) -> Outcome<Self> {
-        made("cauchy", optics::Dispersion::cauchy(&coefficients))
+    #[pyo3(signature = (coefficients, valid_range=None, out_of_range="clamp"))]
+    fn cauchy(coefficients: Vec<f64>, valid_range: Range, out_of_range: &str) -> Outcome<Self> {
+        ranged("cauchy", Law::cauchy(&coefficients), valid_range, out_of_range)
     }
 
     /// n² = 1 + Σ Bᵢ λ²/(λ² − Cᵢ), λ in µm, Cᵢ in µm².
     #[staticmethod]
-    fn sellmeier(b: Vec<f64>, c_um2: Vec<f64>) -> Outcome<Self> {
-        made("sellmeier", optics::Dispersion::sellmeier(&b, &c_um2))
+    #[pyo3(signature = (b, c_um2, valid_range=None, out_of_range="clamp"))]
+    fn sellmeier(b: Vec<f64>, c_um2: Vec<f64>, valid_range: Range, out_of_range: &str) -> Outcome<Self> {
+        ranged("sellmeier", Law::sellmeier(&b, &c_um2), valid_range, out_of_range)
+    }
+
+    /// n² = a₀ + a₁ λ² + a₂ λ⁻² + a₃ λ⁻⁴ + …, λ in µm.
+    #[staticmethod]
+    #[pyo3(signature = (coefficients, valid_range=None, out_of_range="clamp"))]
+    fn schott(coefficients: Vec<f64>, valid_range: Range, out_of_range: &str) -> Outcome<Self> {
+        ranged("schott", Law::schott(&coefficients), valid_range, out_of_range)
+    }
+
+    /// n = A + B λ⁻¹ + C λ⁻³·⁵, λ in µm.
+    #[staticmethod]
+    #[pyo3(signature = (coefficients, valid_range=None, out_of_range="clamp"))]
+    fn conrady(coefficients: Vec<f64>, valid_range: Range, out_of_range: &str) -> Outcome<Self> {
+        ranged("conrady", Law::conrady(&coefficients), valid_range, out_of_range)
+    }
+
+    /// Formula 1 to 9 of refractiveindex.info.
+    #[staticmethod]
+    #[pyo3(signature = (number, coefficients, valid_range=None, out_of_range="clamp"))]
+    fn formula(number: i32, coefficients: Vec<f64>, valid_range: Range, out_of_range: &str) -> Outcome<Self> {
+        ranged("formula", Law::formula(number, &coefficients), valid_range, out_of_range)
+    }
+
+    /// A spline through pairs (nm, n).
+    #[staticmethod]
+    #[pyo3(signature = (entries, valid_range=None, out_of_range="clamp"))]
+    fn table(entries: Vec<[f64; 2]>, valid_range: Range, out_of_range: &str) -> Outcome<Self> {
+        ranged("table", Law::table(&entries), valid_range, out_of_range)
     }
 
     /// The two-term Cauchy law with these n_d and V_d.
@@ -63,17 +114,41 @@ impl PyDispersion {
         &self,
         py: Python<'py>,
         wavelength: PyReadonlyArray1<'py, f64>,
-    ) -> (Column<'py>, Column<'py>, Column<'py>) {
+    ) -> Outcome<(Column<'py>, Column<'py>, Column<'py>)> {
+        if let (Some(range), OutOfRange::Error) = (self.law.valid_range(), self.law.out_of_range())
+            && let Some(nm) = wavelength.as_array().iter().find(|&&nm| !range.contains(Wavelength::from_nanometers(nm)))
+        {
+            let problem = format!("{nm} nm is outside of the law's valid range, {range}, and out_of_range is 'error'");
+            return Err(Error::usage("wavelength", problem).into());
+        }
         let jets: Vec<IorJet> =
             wavelength.as_array().iter().map(|&nm| self.law.at(Wavelength::from_nanometers(nm))).collect();
         let column = |f: fn(&IorJet) -> f64| jets.iter().map(f).collect::<Vec<_>>().into_pyarray(py);
-        (column(|jet| jet.ior), column(|jet| jet.dior_dlambda), column(|jet| jet.d2ior_dlambda2))
+        Ok((column(|jet| jet.ior), column(|jet| jet.dior_dlambda), column(|jet| jet.d2ior_dlambda2)))
     }
 
     /// V_d; None if the index is the same at the F and C lines.
     #[getter]
     fn abbe_number(&self) -> Option<f64> {
         self.law.abbe_number()
+    }
+
+    /// Ends of the valid range in nm; None if the law holds everywhere.
+    #[getter]
+    fn valid_range(&self) -> Range {
+        self.law.valid_range().map(|range| (range.from.nanometers(), range.to.nanometers()))
+    }
+
+    /// What becomes of wavelengths outside of the valid range.
+    #[getter]
+    fn out_of_range(&self) -> &'static str {
+        self.law.out_of_range().name()
+    }
+
+    /// How much ∂²n/∂λ² of a table changes, relatively, when every second entry is left out.
+    #[getter]
+    fn curvature_doubt(&self) -> Option<f64> {
+        self.law.curvature_doubt()
     }
 
     /// Whether the index is the same at every wavelength.

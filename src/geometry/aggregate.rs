@@ -68,6 +68,21 @@ impl Aggregate {
         nearest.hit
     }
 
+    /// A surface that passes through the start of the ray, within rounding, and that the ray has not crossed there. Casts
+    /// no further than that.
+    pub fn coincident(&self, ray: &Ray, departures: &Departures) -> Option<Hit> {
+        let reach = departures.crossings().iter().map(|c| self.placed[c.instance as usize].reach(c.primitive));
+        let magnitude = ray.origin.abs().max_element() + reach.fold(0.0, f64::max);
+        let about = behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest));
+        let mut nearest = Nearest { hit: None, limit: about };
+        self.tree.walk(ray.origin, ray.direction, -about, about, self.spread, |i, _| {
+            let instance = self.instances[i as usize];
+            self.placed[instance as usize].intersect(ray, instance, Some((departures, magnitude)), &mut nearest);
+            nearest.limit
+        });
+        nearest.hit.filter(|hit| hit.at_start)
+    }
+
     /// Calls `f` with every crossing of the ray with a surface at a distance > 0, in no particular order.
     ///
     /// Closed shapes are entered as often as they are left, unless the ray starts inside; edges and vertices count as the

@@ -250,6 +250,7 @@ impl<'a> Follower<'a> {
                 }
                 continue;
             }
+            let met = walk.in_contact(met, counters);
             let transfer = Transfer {
                 distance: walk.travelled,
                 direction: walk.ray.direction,
@@ -370,6 +371,32 @@ impl<'a> Walk<'a> {
         met.material_id > 0 && matches!(self.view.scene.materials[met.material_id as usize - 1].kind, Kind::PassThrough)
     }
 
+    /// What is seen from inside of a glass where `met` is its surface: an opaque surface or a mirror that coincides with it,
+    /// or itself. Without this, rounding would decide for each ray whether glass that stands on a table touches it.
+    fn in_contact(&self, met: SurfacePoint, counters: &mut Counters) -> SurfacePoint {
+        let bounds_glass = |hit: &Hit, id: u32| self.view.inside(hit, id).is_some();
+        if !met.hit.leaving || !self.view.is_in_contact(&met.hit) || !bounds_glass(&met.hit, met.material_id) {
+            return met;
+        }
+        let ahead = Ray { origin: met.point, direction: self.ray.direction };
+        let mut departures = self.departures;
+        departures.depart(&self.ray, &met.hit, true);
+        for _ in 0..MAX_COINCIDENT {
+            counters.rays += 1;
+            let Some(hit) = self.view.aggregate.coincident(&ahead, &departures) else { break };
+            let material_id = self.view.material_id(&hit);
+            let kind = self.view.material(&hit).map(|material| &material.kind);
+            if matches!(kind, None | Some(Kind::Opaque | Kind::Mirror { .. })) {
+                let (point, surface) = self.view.aggregate.local_surface(&ahead, &hit);
+                // Met where the glass was, by the ray that met the glass.
+                let hit = Hit { distance: met.hit.distance, at_start: met.hit.at_start, ..hit };
+                return SurfacePoint { hit, point, surface, material_id };
+            }
+            departures.depart(&ahead, &hit, hit.leaving);
+        }
+        met
+    }
+
     /// Goes straight on through the surface.
     fn cross(&mut self, met: &SurfacePoint) {
         self.crossings += 1;
@@ -404,7 +431,9 @@ impl<'a> Walk<'a> {
                 self.cross(met);
                 Event::Straight { is_interface: false, rough: false }
             }
-            Kind::Mirror => Event::Scattered { scattering: mirror(momentum, &met.surface, medium), rough: false },
+            Kind::Mirror { .. } => {
+                Event::Scattered { scattering: mirror(momentum, &met.surface, medium), rough: false }
+            }
             &Kind::Dielectric { thin_walled: true, rough, .. } => {
                 self.cross(met);
                 Event::Straight { is_interface: true, rough }

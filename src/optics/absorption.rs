@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn a_plate_of_the_stated_thickness_has_the_stated_transmittance() {
         // SCHOTT N-BK7, data sheet: τᵢ at 10 mm.
-        let plate = [[365.0, 0.988], [400.0, 0.997], [546.0, 0.999], [700.0, 0.998]];
+        let plate = [[365.0, 0.988], [400.0, 0.997], [546.0, 0.998], [700.0, 0.998]];
         for meters_per_unit in [1.0, 0.01, 0.001] {
             let glass = Absorption::from_internal_transmittance(&plate, 10.0, meters_per_unit).unwrap();
             let distance = 0.01 / meters_per_unit;

@@ -275,6 +275,26 @@ mod tests {
     }
 
     #[test]
+    fn an_overlap_is_undecided_where_neither_of_two_equals_holds_the_other() {
+        let stack = |entered: &[Inside]| {
+            let mut stack = MediaStack::new();
+            entered.iter().for_each(|&inside| stack.enter(inside));
+            stack
+        };
+        for priority in [0, 3] {
+            let overlap = stack(&[inside(1, priority), inside(2, priority)]);
+            assert!(overlap.is_undecided(&inside(1, priority)), "2 was entered inside of 1 and goes on outside of it");
+            assert!(!overlap.is_undecided(&inside(2, priority)), "2 lies inside of 1");
+            assert!(!overlap.is_undecided(&inside(3, priority)), "never entered");
+        }
+        assert!(!stack(&[inside(1, 1), inside(2, 2)]).is_undecided(&inside(1, 1)), "1 is the stronger");
+        assert!(!stack(&[inside(1, 2), inside(2, 1)]).is_undecided(&inside(1, 2)), "2 is the stronger");
+        assert!(!stack(&[inside(3, 1), inside(1, 2), inside(2, 2)]).is_undecided(&inside(1, 2)), "neither is seen");
+        let lump = |instance| Inside { medium: MediumId(7), ..inside(instance, 0) };
+        assert!(!stack(&[lump(1), lump(2)]).is_undecided(&lump(1)), "two lumps of one glass");
+    }
+
+    #[test]
     fn entered_twice_is_left_twice() {
         let mut stack = MediaStack::new();
         stack.enter(inside(1, 0));

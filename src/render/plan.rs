@@ -17,10 +17,11 @@ use crate::film::{SampleRange, Window};
 use crate::geometry::Shape;
 use crate::integrator::transmittance::absorbs;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
+use crate::optics::dispersion::Dispersion;
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
 use crate::scene::{Object, Scene};
-use crate::spectrum::Wavelength;
+use crate::spectrum::{Wavelength, lines};
 
 /// One layer to be rendered.
 #[derive(Clone, Debug, Serialize)]
@@ -43,6 +44,37 @@ pub struct Decision {
     pub what: String,
     /// Why.
     pub why: String,
+}
+
+/// What a material came to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MaterialDecision {
+    /// Its prim path.
+    pub what: String,
+    /// [`Kind::name`](crate::scene::material::Kind::name).
+    pub kind: &'static str,
+    /// Index at the d line, of what refracts.
+    pub nd: Option<f64>,
+    /// Abbe number; absent without dispersion.
+    pub vd: Option<f64>,
+    /// From which input, and why.
+    pub why: String,
+}
+
+impl MaterialDecision {
+    fn of(material: &Material) -> Self {
+        let law = match &material.kind {
+            Kind::Dielectric { dispersion, .. } => Some(dispersion),
+            _ => None,
+        };
+        Self {
+            what: material.path.clone(),
+            kind: material.kind.name(),
+            nd: law.map(|law| law.at(lines::D).ior),
+            vd: law.and_then(Dispersion::abbe_number),
+            why: material.chosen.clone(),
+        }
+    }
 }
 
 /// Everything that is settled before the first ray.
@@ -86,7 +118,7 @@ pub struct Plan {
     /// What is skipped, and why.
     pub skipped: Vec<Decision>,
     /// What was decided for each material.
-    pub materials: Vec<Decision>,
+    pub materials: Vec<MaterialDecision>,
     /// Oddities of the request and of the stage's settings.
     #[serde(rename = "warnings")]
     pub diagnostics: Diagnostics,
@@ -161,7 +193,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     {
         return Err(Error::scene(warning.places[0].as_str(), format!("{} (--strict)", warning.message)));
     }
-    let materials = scene.materials.iter().map(|m| Decision { what: m.path.clone(), why: m.chosen.clone() }).collect();
+    let materials = scene.materials.iter().map(MaterialDecision::of).collect();
     Ok(Plan {
         product: product.map(|p| p.path.clone()).unwrap_or_default(),
         output: product.map(|p| p.name.clone()).unwrap_or_default(),
@@ -344,14 +376,16 @@ impl fmt::Display for Plan {
             let names: Vec<_> = names.iter().map(|layer| layer.aov.name).collect();
             writeln!(f, "{:13}{}", if i == 0 { "layers" } else { "" }, names.join(", "))?;
         }
-        for (title, decisions) in
-            [("carried", &self.carried), ("skipped", &self.skipped), ("materials", &self.materials)]
-        {
+        let worded = |decisions: &[Decision]| decisions.iter().map(|d| format!("{}: {}", d.what, d.why)).collect();
+        let materials = self.materials.iter().map(|m| format!("{}: {}", m.what, m.why)).collect();
+        let sections: [(&str, Vec<String>); 3] =
+            [("carried", worded(&self.carried)), ("skipped", worded(&self.skipped)), ("materials", materials)];
+        for (title, lines) in sections {
             writeln!(f, "{title}")?;
-            for decision in decisions {
-                writeln!(f, "  {}: {}", decision.what, decision.why)?;
+            for line in &lines {
+                writeln!(f, "  {line}")?;
             }
-            if decisions.is_empty() {
+            if lines.is_empty() {
                 writeln!(f, "  none")?;
             }
         }

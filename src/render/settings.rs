@@ -331,7 +331,6 @@ impl<'a> Attributes<'a> {
         const UNUSED: &[(&str, &str, &str)] = &[
             ("abbe:errorTarget", "0", "rendering to an error target is not offered: every pixel gets all its samples"),
             ("abbe:timeLimit", "0", "a time limit is not offered: the image is finished"),
-            ("abbe:scalarIor", "constant", "only 'constant' is offered: a scalar index has no dispersion"),
             ("abbe:pixelFilter", "box", "values are means over the pixel's own samples: no other filter is offered"),
         ];
         for (name, harmless, message) in UNUSED {

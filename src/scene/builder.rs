@@ -447,7 +447,7 @@ fn build_materials(
     }
     let mut materials = Vec::new();
     let mut ids = vec![0; document.materials.len()];
-    let context = Context { scalar_ior: ScalarIor::default(), meters_per_unit: document.stage.meters_per_unit };
+    let context = Context { scalar_ior: scalar_ior(document)?, meters_per_unit: document.stage.meters_per_unit };
     for (i, authored) in document.materials.iter().enumerate() {
         if used[i] {
             materials.push(material::compile(authored, &context, diagnostics)?);
@@ -455,4 +455,15 @@ fn build_materials(
         }
     }
     Ok((materials, ids))
+}
+
+/// `abbe:scalarIor` of the render settings.
+fn scalar_ior(document: &Document) -> Result<ScalarIor> {
+    const NAME: &str = "abbe:scalarIor";
+    let Some(authored) = document.settings.abbe.get(NAME) else { return Ok(ScalarIor::default()) };
+    let place = format!("render settings, {NAME}");
+    match authored.value.as_str() {
+        Some(text) => ScalarIor::parse(text, &place),
+        None => Err(Error::usage(place, format!("is {}: use constant or nearestGlass", authored.value))),
+    }
 }

@@ -13,13 +13,13 @@ mod values;
 
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::optics::Absorption;
-use crate::optics::dispersion::Dispersion;
+use crate::optics::dispersion::{Dispersion, OutOfRange};
 use crate::optics::media::Priority;
+use crate::optics::{Absorption, Extinction, catalog};
 use crate::scene::description::{self, Shader};
 
-use dialect::{Response, Surface};
-use law::Authored;
+use dialect::{Glass, Response, Surface};
+use law::{Authored, StatedAbsorption};
 use values::Values;
 
 /// From this weight on a surface counts as what the weight says: transmissive, metallic, present.
@@ -36,6 +36,8 @@ pub enum ScalarIor {
     /// It holds at every wavelength; its derivative is exactly 0.
     #[default]
     Constant,
+    /// It is that of the catalogue's glass, liquid or crystal whose n_d is nearest, and so is the curve.
+    NearestGlass,
 }
 
 impl ScalarIor {
@@ -43,11 +45,8 @@ impl ScalarIor {
     pub fn parse(text: &str, place: &str) -> Result<Self> {
         match text {
             "" | "constant" => Ok(Self::Constant),
-            "nearestGlass" | "nearest-glass" => Err(Error::usage(
-                place,
-                format!("'{text}' needs the glass catalogue, which is not part of this version: use constant"),
-            )),
-            _ => Err(Error::usage(place, format!("'{text}' is unknown: use constant"))),
+            "nearestGlass" | "nearest-glass" => Ok(Self::NearestGlass),
+            _ => Err(Error::usage(place, format!("'{text}' is unknown: use constant or nearestGlass"))),
         }
     }
 }
@@ -96,11 +95,36 @@ pub enum Kind {
         thin_walled: bool,
     },
     /// It is reflected: a smooth metal.
-    Mirror,
+    Mirror {
+        /// The metal, where one is stated beyond a colour.
+        conductor: Option<Conductor>,
+    },
     /// It goes straight on, as if the surface were not there.
     PassThrough,
     /// It ends.
     Opaque,
+}
+
+/// The complex index n + ik of a metal.
+#[derive(Clone, Debug)]
+pub struct Conductor {
+    /// n(λ).
+    pub dispersion: Dispersion,
+    /// k(λ).
+    pub extinction: Extinction,
+}
+
+impl Kind {
+    /// In one or two words: dielectric, thin wall, mirror, cut out or opaque.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Dielectric { thin_walled: false, .. } => "dielectric",
+            Self::Dielectric { thin_walled: true, .. } => "thin wall",
+            Self::Mirror { .. } => "mirror",
+            Self::PassThrough => "cut out",
+            Self::Opaque => "opaque",
+        }
+    }
 }
 
 /// Compiles what was authored. Errors name the prim and attribute, and what to author instead.
@@ -133,7 +157,9 @@ fn classify(
         warn_of_idle_law(material, &authored, &reason, diagnostics)?;
         return Ok((Kind::Opaque, format!("opaque: {reason}")));
     };
-    let (kind, reason) = match surface.response(diagnostics)? {
+    let response = surface.response(diagnostics)?;
+    let uses_law = matches!(response, Response::Transmissive { .. } | Response::Metal { .. });
+    let (kind, reason) = match response {
         Response::Transmissive { why, rough, thin_walled } => {
             let (dispersion, source) =
                 dispersion(&surface, surface.shader(), &authored, context.scalar_ior, diagnostics)?;
@@ -154,14 +180,20 @@ fn classify(
             let chosen = format!("{wall} ({why}{lobe}): {source}{fades}{rank}");
             (Kind::Dielectric { dispersion, absorption, priority, rough, thin_walled }, chosen)
         }
-        Response::Metal { why, rough: false } => (Kind::Mirror, format!("mirror: {why}, smooth")),
-        Response::Metal { why, rough: true } => {
-            (Kind::Opaque, format!("opaque: {why}, rougher than {SMOOTH_ROUGHNESS}"))
+        Response::Metal { why, rough } => {
+            let (conductor, source) = match conductor(&surface, &authored, diagnostics)? {
+                Some((conductor, source)) => (Some(conductor), format!("; n + ik from {source}")),
+                None => (None, String::new()),
+            };
+            match rough {
+                false => (Kind::Mirror { conductor }, format!("mirror: {why}, smooth{source}")),
+                true => (Kind::Opaque, format!("opaque: {why}, rougher than {SMOOTH_ROUGHNESS}{source}")),
+            }
         }
         Response::CutOut(why) => (Kind::PassThrough, format!("cut out: {why}")),
         Response::Opaque(why) => (Kind::Opaque, format!("opaque: {why}")),
     };
-    if !matches!(kind, Kind::Dielectric { .. }) {
+    if !uses_law {
         warn_of_idle_law(material, &authored, &reason, diagnostics)?;
     }
     Ok((kind, format!("{reason}{}", passed_over(&terminals, surface.shader()))))
@@ -200,14 +232,30 @@ fn dispersion(
     let glass = surface.glass(diagnostics)?;
     let at_ior = |problem: String| Error::scene(&glass.ior_place, problem);
     let (law, source) = if let Some(stated) = authored.law(glass.ior, diagnostics)? {
+        if let Some(metal) = stated.glass.filter(|entry| entry.is_metal()) {
+            return Err(Error::scene(
+                stated.source,
+                format!("{} is a metal, and light passes this surface: name a glass, or author a metal", metal.name()),
+            ));
+        }
         (stated.dispersion, stated.source)
     } else if let Some(abbe_number) = glass.abbe_number {
-        let law = Dispersion::from_abbe_number(glass.ior, abbe_number).map_err(at_ior)?;
+        // An index that cannot be is the index's fault, what is left is the Abbe number's.
+        Dispersion::constant(glass.ior).map_err(at_ior)?;
+        let law = Dispersion::from_abbe_number(glass.ior, abbe_number)
+            .map_err(|problem| Error::scene(&glass.abbe_place, problem))?;
         (law, format!("{} of {}, n_d from {}", glass.abbe_source, shader.id, glass.ior_source))
     } else {
-        let ScalarIor::Constant = scalar_ior;
-        let law = Dispersion::constant(glass.ior).map_err(at_ior)?;
-        (law, format!("no dispersion is authored, {} of {}", glass.ior_source, shader.id))
+        let constant = Dispersion::constant(glass.ior).map_err(at_ior)?;
+        let authored = format!("no dispersion is authored, {} of {}", glass.ior_source, shader.id);
+        let nearest = match scalar_ior {
+            ScalarIor::Constant => None,
+            ScalarIor::NearestGlass => nearest_glass(&glass, diagnostics)?,
+        };
+        match nearest {
+            Some((law, name)) => (law, format!("{authored}: nearest is {name}")),
+            None => (constant, authored),
+        }
     };
     let scale = authored.scale(diagnostics)?;
     // 1 leaves the law as it is, bit for bit.
@@ -216,6 +264,64 @@ fn dispersion(
     }
     let scaled = law.scaled(scale).map_err(|problem| Error::scene(authored.scale_place(), problem))?;
     Ok((scaled, format!("{} from {source}, dispersion × {scale}", law.describe())))
+}
+
+/// The catalogue's curve nearest in n_d, and its name; `None`, with a warning, where no medium is near.
+fn nearest_glass(glass: &Glass, diagnostics: &mut Diagnostics) -> Result<Option<(Dispersion, String)>> {
+    /// Glasses and liquids lie closer than this to each other from 1.3 to 2; a larger distance means that the index is no
+    /// known medium's, for instance 1 for "does not refract".
+    const NEAR: f64 = 0.01;
+    let entry = catalog::nearest(glass.ior);
+    if (entry.nd() - glass.ior).abs() > NEAR {
+        diagnostics.warn(
+            "no-near-glass",
+            &glass.ior_place,
+            format!(
+                "no medium of the catalogue has an index near {} (the nearest is {}, {:.4}): it stays constant",
+                glass.ior,
+                entry.name(),
+                entry.nd()
+            ),
+        );
+        return Ok(None);
+    }
+    let law = entry.dispersion(OutOfRange::Clamp).map_err(|problem| Error::scene(&glass.ior_place, problem))?;
+    Ok(Some((law, format!("{} (n_d = {:.5})", entry.name(), entry.nd()))))
+}
+
+/// The metal that our attributes state, and where; `None` where they say nothing of it, or half.
+fn conductor(
+    surface: &Surface<'_>,
+    authored: &Authored<'_>,
+    diagnostics: &mut Diagnostics,
+) -> Result<Option<(Conductor, String)>> {
+    let absorption = authored.absorption(diagnostics)?;
+    let law = match authored.has_law()? {
+        true => authored.law(surface.glass(diagnostics)?.ior, diagnostics)?,
+        false => None,
+    };
+    match (law, absorption) {
+        (Some(stated), Some(StatedAbsorption::Extinction { entries, place }))
+            if stated.glass.is_none_or(|entry| entry.is_metal()) =>
+        {
+            let extinction = Extinction::table(&entries).map_err(|problem| Error::scene(place, problem))?;
+            Ok(Some((Conductor { dispersion: stated.dispersion, extinction }, stated.source)))
+        }
+        (None, None) => Ok(None),
+        (law, absorption) => {
+            let place = match (&law, &absorption) {
+                (Some(stated), _) => stated.source.clone(),
+                (None, stated) => stated.as_ref().map_or_else(String::new, |stated| stated.place().to_owned()),
+            };
+            diagnostics.warn(
+                "no-metal",
+                place,
+                "is not the n + ik of a metal, which this surface is: name a metal of the catalogue, author n(λ) and \
+                 abbe:extinction:table, or make the surface transmissive",
+            );
+            Ok(None)
+        }
+    }
 }
 
 /// A law on a surface that lets no light pass is most likely a forgotten transmission.

@@ -24,6 +24,8 @@ pub struct View<'a> {
     pub origin: DVec3,
     /// Per object: whether its glass can coincide with that of another.
     touching: Vec<bool>,
+    /// Per object: whether it can coincide with any other.
+    in_contact: Vec<bool>,
 }
 
 impl<'a> View<'a> {
@@ -39,12 +41,18 @@ impl<'a> View<'a> {
             let ids = &scene.objects[object as usize].material_ids;
             ids.iter().any(|id| id.checked_sub(1).is_some_and(|i| scene.materials[i as usize].has_interior()))
         });
-        Self { scene, aggregate, origin, touching }
+        let in_contact = aggregate.touching(|_| true);
+        Self { scene, aggregate, origin, touching, in_contact }
     }
 
     /// Whether the surface at `hit` can coincide with another object's glass (cemented lenses, liquid in its glass).
     pub fn is_touching(&self, hit: &Hit) -> bool {
         self.touching[hit.instance as usize]
+    }
+
+    /// Whether the surface at `hit` can coincide with any other object (glass on a table, the silver behind a mirror).
+    pub fn is_in_contact(&self, hit: &Hit) -> bool {
+        self.in_contact[hit.instance as usize]
     }
 
     /// `material_id` at `hit`, 0 for none.

@@ -31,6 +31,11 @@ LINE_F, LINE_C = MP.mpf("486.1327"), MP.mpf("656.2725")
 # Closer hits than this, relative to the distance travelled, belong to one place: cemented surfaces.
 SAME_PLACE = 1e-9
 
+# Sellmeier's coefficients as the maker prints them, of glasses that stages name.
+DATA_SHEETS = {
+    "SCHOTT:N-BK7": ((1.03961212, 0.231792344, 1.01046945), (0.00600069867, 0.0200179144, 103.560653)),
+}
+
 Vector = list[Any]
 
 
@@ -208,12 +213,21 @@ class Scene:
 
     def _material(self, prim: Usd.Prim) -> None:
         material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0].GetPrim()
-        law = material.GetAttribute("abbe:dispersion:law").Get()
-        if law is None:
+        ours = UsdShade.Material(material).ComputeSurfaceSource("abbe")[0].GetPrim()
+        where, prefix = (ours, "inputs:") if ours.GetAttribute("info:id").Get() == "AbbeGlass" else (material, "")
+
+        def authored(name: str) -> Any:
+            return where.GetAttribute(f"{prefix}abbe:{name}").Get()
+
+        named = authored("glass")
+        if not named and not authored("dispersion:law"):
             return
-        assert law == "sellmeier"
-        b, c = (tuple(material.GetAttribute(f"abbe:dispersion:sellmeier:{name}").Get()) for name in "bc")
-        priority = material.GetAttribute("abbe:dielectricPriority").Get()
+        if named:
+            b, c = DATA_SHEETS[named]
+        else:
+            assert authored("dispersion:law") == "sellmeier"
+            b, c = (tuple(authored(f"dispersion:sellmeier:{name}")) for name in "bc")
+        priority = authored("dielectricPriority")
         self.glasses[str(prim.GetPath())] = Glass(material.GetName(), b, c, priority)
 
     def _mesh(self, mesh: UsdGeom.Mesh) -> None:

@@ -390,12 +390,12 @@ def test_doctor_finds_everything_well_here(run: Run) -> None:
 
 
 def test_doctor_names_the_extra_of_everything_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    extras = {"USD": "usd", "OpenImageIO": "check", "Pillow": "preview", "matplotlib": "plot"}
-    for module in ("pxr", "pxr.Usd", "OpenImageIO", "PIL", "matplotlib"):
+    extras = {"USD": "usd", "MaterialX": "mtlx", "OpenImageIO": "check", "Pillow": "preview", "matplotlib": "plot"}
+    for module in ("pxr", "pxr.Usd", "MaterialX", "OpenImageIO", "PIL", "matplotlib"):
         monkeypatch.delitem(sys.modules, module, raising=False)
 
     def find_spec(name: str, *_: object) -> None:
-        if name in ("pxr", "OpenImageIO", "PIL", "matplotlib"):
+        if name in ("pxr", "MaterialX", "OpenImageIO", "PIL", "matplotlib"):
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
     monkeypatch.setattr(sys, "meta_path", [SimpleNamespace(find_spec=find_spec), *sys.meta_path])

@@ -153,6 +153,19 @@ from pxr import Usd
     assert "import abbe before opening a stage" in call(program, flags=())
 
 
+@pytest.mark.skipif(not SDR_TAKES_DEFINITIONS, reason=f"USD {VERSION} takes no definitions of shaders")
+def test_a_broken_installation_breaks_nobody_else(tmp_path: Path) -> None:
+    program = """
+import sys, pathlib, abbe
+abbe.schemas.plugin_path = lambda: pathlib.Path(sys.argv[1])
+from pxr import Usd, UsdShade, Sdr
+print(Sdr.Registry().GetShaderNodeByIdentifier("UsdPreviewSurface") is not None)
+print(abbe.schemas.register_shader())
+"""
+    expected = f"True\n{tmp_path / 'AbbeGlass.usda'} cannot be read: install abbe again\n"
+    assert call(program, tmp_path) == expected
+
+
 def test_modules_are_loaded_as_ever() -> None:
     program = """
 import sys, abbe

@@ -339,6 +339,14 @@ def test_glass_beside_and_within_glass_is_silent(stage: Callable[..., Path], par
     assert validate(stage(*parts, material(), material("Water"))) == []
 
 
+def test_what_is_flat_overlaps_nothing(stage: Callable[..., Path]) -> None:
+    sheet = mesh("Sheet", [(0, 1, 3, 2)], size=(0.0, 3.0, 3.0), look="Water")
+    assert only(stage(mesh("A"), sheet, material(), material("Water")), "abbe:GlassThickness").path == "/World/Sheet"
+    scale = 'double3 xformOp:scale = (1, 0, 1)\nuniform token[] xformOpOrder = ["xformOp:scale"]'
+    flattened = mesh("B", size=0.7, at=(0.7, 0.7, 0.7), look="Water", more=scale)
+    assert validate(stage(mesh("A"), flattened, material(), material("Water"))) == []
+
+
 def test_many_bodies_are_told_of_once(stage: Callable[..., Path]) -> None:
     gems = """def Xform "Gem%d" (instanceable = true
         prepend references = </Prototype>) {

@@ -36,6 +36,7 @@ def test_the_wheel_carries_what_it_must(wheel: Path) -> None:
     for name in (
         "plugin/plugInfo.json",
         "plugin/generatedSchema.usda",
+        "plugin/AbbeGlass.usda",
         "py.typed",
         "_core.pyi",
         "cli/render.py",

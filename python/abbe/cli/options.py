@@ -137,6 +137,11 @@ def add_request(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--dispersion-scale", type=float, metavar="S", help="multiplies all dispersion: 0 none, 1 physical"
     )
+    group.add_argument(
+        "--scalar-ior",
+        choices=("constant", "nearest-glass"),
+        help="what becomes of an index without dispersion; constant",
+    )
     group.add_argument("--seed", type=int, metavar="N", help="same seed, same bits")
     group.add_argument(
         "--threads", type=int, metavar="N", help="all of the machine's unless given; never changes a bit"
@@ -220,6 +225,7 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
                 overrides=args.overrides,
                 search_paths=args.search_path,
                 missing=args.missing,
+                scalar_ior=args.scalar_ior,
                 strict=args.strict,
             )
         except NotUsdError as error:
@@ -231,6 +237,7 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
         "--variant": bool(args.variant),
         "--set": bool(args.overrides),
         "--search-path": bool(args.search_path),
+        "--scalar-ior": args.scalar_ior is not None,
     }
     for option, is_given in given.items():
         if is_given:

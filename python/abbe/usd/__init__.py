@@ -9,6 +9,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
+from . import tokens
 from .description import Description
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def describe(
     overrides: Mapping[str, Any] | Sequence[str] = (),
     search_paths: Sequence[str | os.PathLike[str]] = (),
     missing: str = "warn",
+    scalar_ior: str | None = None,
     strict: bool = False,
 ) -> Description:
     """Read a USD stage into a scene description.
@@ -45,6 +47,7 @@ def describe(
     overrides : values such as ``"/World/Glass.inputs:ior=1.6"``, as text or as a mapping to Python values
     search_paths : folders in which relative asset paths are looked up after the stage's own
     missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+    scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
     strict : a stage without a camera is an error
 
     Returns
@@ -65,7 +68,7 @@ def describe(
     """
     from .reader import read_stage
 
-    return read_stage(
+    description = read_stage(
         stage_or_path,
         frame=frame,
         camera=camera,
@@ -78,6 +81,9 @@ def describe(
         missing=missing,
         strict=strict,
     )
+    if scalar_ior is not None:
+        description.document["settings"]["abbe"][tokens.SCALAR_IOR] = {"type": "token", "value": scalar_ior}
+    return description
 
 
 def list_cameras(

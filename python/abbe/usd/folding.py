@@ -7,6 +7,7 @@ compute from constants is in :mod:`.nodes`; all others, textures above all, driv
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +18,7 @@ from .description import Diagnostics
 from .nodes import Value, find_node
 from .values import place
 
-__all__ = ["Driver", "Network", "terminal_shader"]
+__all__ = ["Driver", "Network"]
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,33 @@ class _DrivenError(Exception):
 
 
 # Nodes that hand on a surface: the input that they hand on.
-_SURFACE_WRAPPERS = {"ND_dot_surfaceshader": "in", "ND_surfacematerial": "surfaceshader"}
+_SURFACE_WRAPPERS = {
+    "ND_dot_surfaceshader": "in",
+    "ND_surfacematerial": "surfaceshader",
+    # What scatters light is a node of its own there.
+    "LamaSurface": "materialFront",
+    "ND_lama_surface": "materialFront",
+    "MtlSingleBRDF": "brdf",
+    "vray:MtlSingleBRDF": "brdf",
+}
 # Nodes one behind the other; real networks have tens. Deeper ones are not constants to anybody.
 _DEEPEST = 64
+
+
+class _Role(enum.Enum):
+    """What a prim is to connections."""
+
+    CONTAINER = enum.auto()
+    NODE = enum.auto()
+    NEITHER = enum.auto()
+
+
+def _known(prim: Any) -> tuple[Any, _Role]:
+    if not prim:
+        return None, _Role.NEITHER
+    if prim.IsA(UsdShade.NodeGraph):  # a Material is one
+        return prim, _Role.CONTAINER
+    return prim, _Role.NODE if UsdShade.ConnectableAPI(prim) else _Role.NEITHER
 
 
 class Network:
@@ -47,13 +72,14 @@ class Network:
         self._diagnostics = diagnostics
         self._has_primvar = has_primvar
         self._outputs: dict[Any, Value | Driver] = {}
+        self._prims: dict[Any, tuple[Any, _Role]] = {}
         self._depth = 0
 
     def value(self, attribute: Any) -> Value | Driver | None:
         """Return the constant that an input is, or what drives it; None where nobody gave it a value."""
         if not attribute.HasAuthoredConnections():
             return self._own(attribute)
-        chain, source = _follow(attribute)
+        chain, source = self._follow(attribute)
         if source is not None:
             return self._output(*source)
         for link in reversed(chain):
@@ -65,14 +91,60 @@ class Network:
             self._diagnostics.warn("dangling-connection", place(attribute), problem)
         return None
 
+    def surface_shader(self, output: Any) -> Any:
+        """Return the shader prim that a material's terminal leads to, through wrappers of surfaces; None if to none."""
+        seen = set()
+        while True:
+            _, source = self._follow(output)
+            if source is None:
+                return None
+            prim, _ = source
+            shader = UsdShade.Shader(prim)
+            wrapped = _SURFACE_WRAPPERS.get(str(shader.GetShaderId() or "")) if shader else None
+            behind = prim.GetAttribute(tokens.INPUTS_PREFIX + wrapped) if wrapped else None
+            if not behind or not behind.HasAuthoredConnections() or prim.GetPath() in seen:
+                return prim if shader else None
+            seen.add(prim.GetPath())
+            output = behind
+
     def _own(self, attribute: Any) -> Value | None:
-        if not attribute.HasAuthoredValue():
-            return None
         try:
             data = attribute.Get(self._time)
         except (RuntimeError, TypeError):
             return None
-        return None if data is None else Value(str(attribute.GetTypeName()), data)
+        # A schema's fallback is not what somebody said.
+        if data is None or not attribute.HasAuthoredValue():
+            return None
+        return Value(str(attribute.GetTypeName()), data)
+
+    def _follow(self, attribute: Any) -> tuple[list[Any], tuple[Any, str] | None]:
+        """Follow connections through containers, from ``attribute`` to a shader's output.
+
+        Returns the attributes on the way, ``attribute`` first, and the shader with the name of its output; None where
+        the way ends before one.
+        """
+        chain = [attribute]
+        seen = {attribute.GetPath()}
+        while True:
+            # Most ways end in an input of the material; asking it for its connections is all they cost.
+            for path in chain[-1].GetConnections():
+                if path in seen:
+                    continue
+                prim_path = path.GetPrimPath()
+                known = self._prims.get(prim_path)
+                if known is None:
+                    known = self._prims[prim_path] = _known(attribute.GetStage().GetPrimAtPath(prim_path))
+                prim, role = known
+                if role is _Role.CONTAINER:
+                    found = prim.GetAttribute(path.name)
+                    if found:
+                        chain.append(found)
+                        seen.add(path)
+                        break
+                elif role is _Role.NODE and path.name.startswith(tokens.OUTPUTS_PREFIX):
+                    return chain, (prim, path.name)
+            else:
+                return chain, None
 
     def _output(self, shader: Any, name: str) -> Value | Driver:
         """Return what an output of a shader is."""
@@ -121,33 +193,6 @@ def _zero(suffix: str) -> Value | None:
     return Value(type_name, sdf_type.defaultValue) if type_name and sdf_type else None
 
 
-def _follow(attribute: Any) -> tuple[list[Any], tuple[Any, str] | None]:
-    """Follow connections through containers, from ``attribute`` to a shader's output.
-
-    Returns the attributes on the way, ``attribute`` first, and the shader with the name of its output; None where the
-    way ends before one.
-    """
-    chain = [attribute]
-    seen = {attribute.GetPath()}
-    while True:
-        here = chain[-1]
-        stage = here.GetStage()
-        for path in here.GetConnections() if here.HasAuthoredConnections() else ():
-            prim = stage.GetPrimAtPath(path.GetPrimPath())
-            if not prim:
-                continue
-            if prim.IsA(UsdShade.NodeGraph):
-                found = prim.GetAttribute(path.name)
-                if found and found.GetPath() not in seen:
-                    chain.append(found)
-                    seen.add(found.GetPath())
-                    break
-            elif path.name.startswith(tokens.OUTPUTS_PREFIX) and UsdShade.ConnectableAPI(prim):
-                return chain, (prim, path.name)
-        else:
-            return chain, None
-
-
 def _problem(chain: list[Any]) -> str | None:
     """Return what is wrong with a way that ends in nothing; None where it ends in an input without a value."""
     last = chain[-1]
@@ -157,20 +202,3 @@ def _problem(chain: list[Any]) -> str | None:
     if any(path in seen for path in last.GetConnections()):
         return "its connections lead back to themselves; they are ignored"
     return "the connection leads to no value; it is ignored"
-
-
-def terminal_shader(output: Any) -> Any:
-    """Return the shader prim that a material's output leads to, through wrappers of surfaces; None if to none."""
-    seen = set()
-    while True:
-        _, source = _follow(output)
-        if source is None:
-            return None
-        prim, _ = source
-        shader = UsdShade.Shader(prim)
-        wrapped = _SURFACE_WRAPPERS.get(str(shader.GetShaderId() or "")) if shader else None
-        behind = prim.GetAttribute(tokens.INPUTS_PREFIX + wrapped) if wrapped else None
-        if not behind or not behind.HasAuthoredConnections() or prim.GetPath() in seen:
-            return prim if shader else None
-        seen.add(prim.GetPath())
-        output = behind

@@ -14,7 +14,7 @@ from typing import Any
 from . import tokens
 from ._pxr import Usd, UsdGeom, UsdShade
 from .description import Diagnostics
-from .folding import Driver, Network, terminal_shader
+from .folding import Driver, Network
 from .values import authored_namespace, place, plain
 
 __all__ = ["MaterialReader", "warn_unknown_names"]
@@ -92,7 +92,7 @@ class MaterialReader:
         }
         self._check_names(material["path"], material["abbe"])
         self._check_names(material["path"], interface, tokens.INPUTS_PREFIX)
-        shaders = [self._shader(network, shader, name) for shader, name in self._surfaces(prim).items()]
+        shaders = [self._shader(network, shader, name) for shader, name in self._surfaces(network, prim).items()]
         for shader in shaders:
             self._check_names(shader["path"], shader["abbe"], tokens.INPUTS_PREFIX)
         if shaders:
@@ -104,7 +104,7 @@ class MaterialReader:
     def _check_names(self, path: str, names: Iterable[str], prefix: str = "") -> None:
         warn_unknown_names(path, names, tokens.MATERIAL_NAMES, self._diagnostics, prefix=prefix)
 
-    def _surfaces(self, prim: Any) -> dict[Any, str]:
+    def _surfaces(self, network: Network, prim: Any) -> dict[Any, str]:
         """Return the surface shaders and the terminals they were found through, in the order of the terminals."""
         others = sorted(output.GetFullName() for output in UsdShade.Material(prim).GetSurfaceOutputs())
         shaders: dict[Any, str] = {}
@@ -112,7 +112,7 @@ class MaterialReader:
             attribute = prim.GetAttribute(name)
             if not attribute or not attribute.HasAuthoredConnections():
                 continue
-            shader = terminal_shader(attribute)
+            shader = network.surface_shader(attribute)
             if shader:
                 shaders.setdefault(shader, name)
             else:

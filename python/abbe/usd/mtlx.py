@@ -5,38 +5,29 @@ to ``@file.mtlx@</MaterialX/Materials/Glass>`` finds the same prims: ``Materials
 ``NodeGraphs``. Two things differ, to the benefit of those who evaluate constants: a node that the document itself
 defines by a graph becomes that graph, and an input that does not fit its definition is left out by itself, not with its
 whole shader. Only surfaces are translated; looks, collections, variants and displacement are not.
-
-Documents are checked before the MaterialX library, which recurses without a limit, sees them.
 """
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
-from xml.parsers import expat
 
 from . import tokens
 from ._pxr import Ar, Gf, Sdf, Tf
 from .description import Diagnostics
+from .documents import MAX_DEPTH, DocumentError, DocumentReader
 
-__all__ = ["DocumentError", "read_document"]
-
-
-class DocumentError(Exception):
-    """A document cannot be read; the message says why and what to do."""
+__all__ = ["read_document"]
 
 
-# Largest document with all it includes, bytes and elements: the standard libraries of MaterialX 1.39, the largest
-# documents that are in use, have 2.5 MB and 40,000. Half a minute is what the largest accepted take to translate.
-_MAX_BYTES = 16_000_000
-_MAX_ELEMENTS = 200_000
-# Documents nest four deep (materialx, nodegraph, node, input); graphs of nodes that are graphs somewhat deeper.
-_MAX_DEPTH = 64
-# Shaders that one node may unfold to where graphs are made of graphs; production graphs have hundreds.
-_MAX_UNFOLDED = 10_000
+# Shaders that one node may unfold to where graphs are made of graphs, production graphs having hundreds; and what a
+# document may become, all its materials together: nodes, and inputs of surfaces (OpenPBR has 41).
+_MAX_UNFOLDED = 2_000
+_MAX_UNFOLDED_ALL = 200_000
 
 
 def read_document(identifier: str, diagnostics: Diagnostics) -> Any:
@@ -63,11 +54,14 @@ def read_document(identifier: str, diagnostics: Diagnostics) -> Any:
         raise DocumentError(f"needs MaterialX 1.39 or later, this is {mx.getVersionString()}: pip install 'abbe[mtlx]'")
     document = mx.createDocument()
     try:
-        _Reader(mx).read(document, identifier)
+        DocumentReader(mx).read(document, identifier)
         mx.flattenFilenames(document)
+        # Before the library is there to mix with.
+        materials = document.getMaterialNodes()
         local = frozenset(definition.getName() for definition in document.getNodeDefs())
         document.setDataLibrary(_standard_library())
-        return _Translator(mx, document, local, identifier, diagnostics).layer
+        translator = _Translator(mx, document, local, identifier, diagnostics)
+        return translator.translate(materials)
     except DocumentError:
         raise
     except Exception as error:  # MaterialX' own exceptions have no common base
@@ -84,106 +78,13 @@ def _standard_library() -> Any:
     return library
 
 
-class _Reader:
-    """Reads a document with what it includes; included files are looked for beside the one that includes them."""
-
-    def __init__(self, mx: Any) -> None:
-        self._mx = mx
-        self._bytes = 0
-        self._elements = 0
-        self._open: list[str] = []
-
-    def read(self, document: Any, identifier: str) -> None:
-        """Read the file of ``identifier`` into ``document``."""
-        resolved = Ar.GetResolver().Resolve(identifier)
-        if not resolved:
-            raise DocumentError(f"{identifier}: there is no such file: check the path")
-        path = str(resolved)
-        if path in self._open:
-            raise DocumentError(f"{path}: includes itself: remove the xi:include")
-        if len(self._open) >= _MAX_DEPTH:
-            raise DocumentError(f"{path}: is included through more than {_MAX_DEPTH} files: include it directly")
-        text = self._checked(path, resolved)
-        options = self._mx.XmlReadOptions()
-
-        def include(included: Any, file: Any, *_: Any) -> None:
-            name = file.asString().replace("\\", "/")
-            if not self._is_standard(name, path):
-                self.read(included, Ar.GetResolver().CreateIdentifier(name, resolved))
-
-        options.readXIncludeFunction = include
-        self._open.append(path)
-        self._mx.readFromXmlString(document, text, self._mx.FileSearchPath(), options)
-        self._open.pop()
-
-    def _is_standard(self, name: str, includer: str) -> bool:
-        """Return whether a file is one of MaterialX' own, whose definitions are there anyhow."""
-        if Path(includer).parent.joinpath(name).exists():
-            return False
-        search = self._mx.getDefaultDataSearchPath()
-        return any(Path(folder.asString(), part, name).is_file() for folder in search for part in ("", "libraries"))
-
-    def _checked(self, path: str, resolved: Any) -> str:
-        """Return the text of a file that is well-formed, of sensible size and without a document type."""
-        data = _content(path, resolved, _MAX_BYTES - self._bytes)
-        self._bytes += len(data)
-        depth = 0
-        parser = expat.ParserCreate()
-
-        def start(*_: Any) -> None:
-            nonlocal depth
-            depth += 1
-            self._elements += 1
-            if depth > _MAX_DEPTH or self._elements > _MAX_ELEMENTS:
-                raise DocumentError(
-                    f"{path}: has more than {_MAX_ELEMENTS} elements, or more than {_MAX_DEPTH} within each other: "
-                    "split the document"
-                )
-
-        def end(_: str) -> None:
-            nonlocal depth
-            depth -= 1
-
-        def document_type(*_: Any) -> None:
-            raise DocumentError(f"{path}: has a document type (<!DOCTYPE>), which MaterialX does not know: remove it")
-
-        parser.StartElementHandler = start
-        parser.EndElementHandler = end
-        parser.StartDoctypeDeclHandler = document_type
-        try:
-            parser.Parse(data, True)
-            return data.decode("utf-8")
-        except (expat.ExpatError, UnicodeDecodeError) as error:
-            raise DocumentError(f"{path}: is no XML in UTF-8 ({error}): correct the document") from None
-
-
-def _content(path: str, resolved: Any, limit: int) -> bytes:
-    """Return the bytes of a file on disk, or of one in a package or store that the resolver opens."""
-    too_large = DocumentError(f"{path}: is larger than {limit:,} bytes, or with what it includes: split the document")
-    try:
-        if Path(path).is_file():
-            with open(path, "rb") as file:
-                data = file.read(limit + 1)
-        else:
-            asset = Ar.GetResolver().OpenAsset(resolved)
-            if asset is None:
-                raise DocumentError(f"{path}: cannot be opened: check the path")
-            if asset.GetSize() > limit:
-                raise too_large
-            data = bytes(asset.GetBuffer())
-    except (OSError, AttributeError) as error:  # an older USD opens no assets from Python
-        raise DocumentError(f"{path}: cannot be read ({error}): check the path") from None
-    if len(data) > limit:
-        raise too_large
-    return data
-
-
+@dataclass(frozen=True)
 class _Scope:
     """Where nodes stand that know each other by name: the document, for one material, or a graph."""
 
-    def __init__(self, element: Any, path: Any) -> None:
-        self.element = element
-        self.path = path
+    element: Any
+    path: Any
+    is_document: bool = False
 
 
 class _Translator:
@@ -198,22 +99,25 @@ class _Translator:
         self._color_space = document.getActiveColorSpace()
         # Node graphs that stand in the layer, and how many shaders each unfolds to; None while it is being written.
         self._graphs: dict[str, int | None] = {}
+        self._unfolded = 0
+        # Nodes of the document itself that are still to be written below a material.
+        self._waiting: list[Any] = []
         self.layer = Sdf.Layer.CreateAnonymous(f"{Path(identifier).name}.usda")
         self._root = Sdf.Path(tokens.MATERIALX_ROOT)
-        with Sdf.ChangeBlock():
-            self._translate()
 
-    def _translate(self) -> None:
-        Sdf.CreatePrimInLayer(self.layer, self._root).specifier = Sdf.SpecifierDef
-        if self._color_space:
-            self.layer.customLayerData = {"colorSpace": self._color_space}
-        materials = [m for m in self._document.getMaterialNodes() if m.getDocument() == self._document]
-        names = {material.getName() for material in materials}
-        for material in materials:
-            prim = self._material(material)
-            base = material.getInheritString()
-            if base in names:
-                prim.specializesList.prependedItems = [self._path("Materials", base)]
+    def translate(self, materials: list[Any]) -> Any:
+        """Return the layer with these materials of the document, and what they are made of."""
+        with Sdf.ChangeBlock():
+            Sdf.CreatePrimInLayer(self.layer, self._root).specifier = Sdf.SpecifierDef
+            if self._color_space:
+                self.layer.customLayerData = {"colorSpace": self._color_space}
+            names = {material.getName() for material in materials}
+            for material in materials:
+                prim = self._material(material)
+                base = material.getInheritString()
+                if base in names:
+                    prim.specializesList.prependedItems = [self._path("Materials", base)]
+        return self.layer
 
     def _warn(self, element: Any, message: str) -> None:
         self._diagnostics.warn("materialx", f"{self._identifier}: {element.getNamePath()}", message)
@@ -269,6 +173,8 @@ class _Translator:
         shaders = self._mx.getShaderNodes(material, self._mx.SURFACE_SHADER_TYPE_STRING)
         for shader in shaders[:1]:
             self._surface(shader, prim)
+        while self._waiting:
+            self._node(*self._waiting.pop())
         if not shaders and material.getInput("surfaceshader") is not None:
             self._warn(material, "its surface shader is not in the document; the material is empty")
         return prim
@@ -305,14 +211,16 @@ class _Translator:
 
     def _interface(self, node: Any, definition: Any, prim: Any, material: Any) -> None:
         """Connect every input of the definition to the material, and write there, or connect, those of the node."""
+        self._count(len(definition.getActiveInputs()))
         for declared in definition.getActiveInputs():
             public = self._input(material, declared)
             self._connect(self._input(prim, declared), public.path)
+        # Comparing elements compares all that is in them.
         parent = node.getParent()
-        if parent == self._document:
-            scope = _Scope(parent, material.path.AppendChild(tokens.NODE_GRAPHS))
-        else:
+        if parent.isA(self._mx.NodeGraph):
             scope = _Scope(parent, self._graph_in(material, parent))
+        else:
+            scope = self._outside(material)
         for item in self._fitting_inputs(node, definition):
             self._set_value(self._input(material, item), item)
             source = self._source(item, scope, material)
@@ -374,7 +282,16 @@ class _Translator:
             source = self._source(item, scope, material)
             if source is not None:
                 self._connect(attribute, source)
-        return (self._graphs.get(definition.getName()) or 1) if graph is not None else 1
+        size = (self._graphs.get(definition.getName()) or 1) if graph is not None else 1
+        self._count(size)
+        return size
+
+    def _count(self, size: int) -> None:
+        self._unfolded += size
+        if self._unfolded > _MAX_UNFOLDED_ALL:
+            raise DocumentError(
+                f"unfolds to more than {_MAX_UNFOLDED_ALL:,} nodes and inputs of surfaces: split the document"
+            )
 
     def _custom_graph(self, definition: Any) -> Any:
         """Return the path of the graph that implements a definition of the document; None if there is none to use."""
@@ -398,7 +315,7 @@ class _Translator:
     def _write_graph(self, name: str, graph: Any, definition: Any = None) -> None:
         """Write a node graph under ``/MaterialX/NodeGraphs``, with the interface of its definition if it has one."""
         self._graphs[name] = None
-        if sum(size is None for size in self._graphs.values()) > _MAX_DEPTH:
+        if sum(size is None for size in self._graphs.values()) > MAX_DEPTH:
             self._graphs[name] = _MAX_UNFOLDED + 1
             return
         path = self._path(tokens.NODE_GRAPHS, name)
@@ -422,16 +339,20 @@ class _Translator:
         if self.layer.GetPrimAtPath(path) is None:
             if name not in self._graphs:
                 self._write_graph(name, graph)
+            self._count(self._graphs[name] or 1)
             prim = self._refer(path, self._path(tokens.NODE_GRAPHS, name))
             # What drives the graph's own inputs stands beside it in the document.
-            outside = _Scope(self._document, material.path.AppendChild(tokens.NODE_GRAPHS))
             for item in graph.getInputs():
-                source = self._source(item, outside, material)
+                source = self._source(item, self._outside(material), material)
                 if source is not None:
                     self._connect(self._input(prim, item), source)
         return path
 
     # Connections
+
+    def _outside(self, material: Any) -> _Scope:
+        """Return the document as its nodes are written for one material."""
+        return _Scope(self._document, material.path.AppendChild(tokens.NODE_GRAPHS), True)
 
     def _source(self, port: Any, scope: _Scope, material: Any) -> Any:
         """Return the path of the property that an input or output of the document is connected to, None if none.
@@ -461,20 +382,14 @@ class _Translator:
         if node is None or not node.isA(self._mx.Node):
             self._warn(port, f"refers to the node '{node_name}', which is not there; the connection is ignored")
             return None
-        if material is not None and scope.element == self._document:
-            self._write_upstream(node, scope, material)
+        path = scope.path.AppendChild(_valid(node_name))
+        if scope.is_document and self.layer.GetPrimAtPath(path) is None:
+            self._define(path)
+            self._waiting.append((node, scope, material))
         definition = node.getNodeDef() or node.getNodeDef("", True)
         names = [item.getName() for item in definition.getActiveOutputs()] if definition is not None else []
         chosen = output or (names[0] if names else "out")
-        return scope.path.AppendChild(_valid(node_name)).AppendProperty(tokens.OUTPUTS_PREFIX + _valid(chosen))
-
-    def _write_upstream(self, node: Any, scope: _Scope, material: Any) -> None:
-        """Write a node of the document below a material, as are all it depends on, which this comes back for."""
-        path = scope.path.AppendChild(_valid(node.getName()))
-        if self.layer.GetPrimAtPath(path) is None:
-            # The prim is there before its inputs are looked at, so that a circle ends.
-            self._define(path)
-            self._node(node, scope, material)
+        return path.AppendProperty(tokens.OUTPUTS_PREFIX + _valid(chosen))
 
     # Values
 

@@ -168,8 +168,8 @@ _MATH: dict[str, tuple[dict[str, Any], Callable[..., Any]]] = {
     "modulo": (_pair(0.0, 1.0), lambda in1, in2: in1 - in2 * np.floor(in1 / in2)),
     "power": (_pair(0.0, 1.0), lambda in1, in2: np.power(in1, in2)),
     "safepower": (_pair(0.0, 1.0), lambda in1, in2: np.sign(in1) * np.power(np.abs(in1), in2)),
-    "min": (_pair(0.0, 0.0), np.minimum),
-    "max": (_pair(0.0, 0.0), np.maximum),
+    "min": (_pair(0.0, 0.0), lambda in1, in2: np.minimum(in1, in2)),
+    "max": (_pair(0.0, 0.0), lambda in1, in2: np.maximum(in1, in2)),
     "invert": ({"in": 0.0, "amount": 1.0}, lambda amount, **others: amount - others["in"]),
     "absval": ({"in": 0.0}, _of_in(np.abs)),
     "sign": ({"in": 0.0}, _of_in(np.sign)),
@@ -223,6 +223,7 @@ def find_node(identifier: str, output: str) -> Formula | Choice | None:
     # types of inputs.
     last = variant.rpartition("_")[2]
     mtlx_type = last.rstrip("ABCFIV")
+    suffix = last[len(mtlx_type) :]
     type_name = tokens.MATERIALX_TYPES.get(mtlx_type)
     if type_name is None:
         return None
@@ -230,11 +231,11 @@ def find_node(identifier: str, output: str) -> Formula | Choice | None:
         inputs, compute = _MATH[category]
         return Formula(inputs, compute, type_name)
     if category in _COMPARISONS or category == "switch":
-        return _choice(category, type_name)
-    return _channels(category, last[len(mtlx_type) :], type_name, output)
+        return _choice(category, suffix, type_name)
+    return _channels(category, suffix, type_name, output)
 
 
-def _choice(category: str, type_name: str) -> Choice:
+def _choice(category: str, suffix: str, type_name: str) -> Choice:
     if category == "switch":
 
         def branch(which: float) -> str | None:
@@ -244,6 +245,8 @@ def _choice(category: str, type_name: str) -> Choice:
         return Choice({"which": 0.0}, branch, type_name)
     compared, holds = _COMPARISONS[category]
     if type_name == "bool":
+        # The comparison itself. Where it is not of booleans, the library has 1 for the first number of all three.
+        compared = compared if suffix == "B" else {"value1": 1.0, "value2": 0.0}
         return Choice(compared, lambda value1, value2: holds(value1, value2), type_name)
     return Choice(compared, lambda value1, value2: "in1" if holds(value1, value2) else "in2", type_name)
 

@@ -18,7 +18,8 @@ from ..errors import NotUsdError, StageError, UsageError
 from . import tokens
 from ._pxr import Ar, Pcp, Sdf, Tf, Usd, UsdUtils
 from .description import Diagnostics
-from .mtlx import DocumentError, read_document
+from .documents import DocumentError
+from .mtlx import read_document
 from .substitution import plain_names, substitute
 from .values import place
 
@@ -257,8 +258,11 @@ def bring_in_documents(opened: OpenedStage, diagnostics: Diagnostics) -> None:
     if Sdf.FileFormat.FindByExtension(tokens.MATERIALX_EXTENSION):
         return
     while True:
-        named = {document_name(str(error)) for error in _composition_errors(opened.stage)}
-        wanted = sorted(name for name in named if name is not None and name not in opened.documents)
+        errors = _composition_errors(opened.stage)
+        named = {document_name(str(error)) for error in errors if isinstance(error, _UNREAD)}
+        # What is muted somebody does not want.
+        known = {*opened.documents, *opened.stage.GetMutedLayers()}
+        wanted = sorted(name for name in named if name is not None and name not in known)
         if not wanted:
             return
         with Ar.ResolverContextBinder(opened.stage.GetPathResolverContext()):
@@ -283,7 +287,8 @@ def document_name(text: str) -> str | None:
     """Return the identifier of the MaterialX document that a composition error is about, None if about none."""
     named = _ASSET.search(text)
     identifier = named[1].partition(_FORMAT_ARGUMENTS)[0] if named else ""
-    return identifier if identifier.lower().endswith(f".{tokens.MATERIALX_EXTENSION}") else None
+    extension = Ar.GetResolver().GetExtension(identifier).lower()
+    return identifier if extension == tokens.MATERIALX_EXTENSION else None
 
 
 def _apply(opened: OpenedStage, variants: Sequence[str], overrides: Overrides, diagnostics: Diagnostics) -> None:
@@ -517,6 +522,7 @@ def _composition_errors(stage: Any) -> list[Any]:
 
 _ASSET = re.compile(r"@([^@]+)@")
 _FORMAT_ARGUMENTS = ":SDF_FORMAT_ARGS:"
+_UNREAD = (Pcp.ErrorInvalidAssetPath, Pcp.ErrorInvalidSublayerPath)
 _MISSING = tuple(
     getattr(Pcp, name)
     for name in (

@@ -206,6 +206,7 @@ LENS_NAMES: Final = {
     "abbe:lens:back:aspheres": "double[]",
     "abbe:lens:back:semiDiameter": "double",
 }
+SCALAR_IOR: Final = "abbe:scalarIor"
 SETTINGS_NAMES: Final = {
     "abbe:integrator": "token",
     "abbe:samples": "int",
@@ -216,7 +217,7 @@ SETTINGS_NAMES: Final = {
     "abbe:dispersionScale": "double",
     "abbe:seed": "int",
     "abbe:seedPerFrame": "bool",
-    "abbe:scalarIor": "token",
+    SCALAR_IOR: "token",
     "abbe:pixelFilter": "token",
     "abbe:pixelFilterWidth": "float",
     "abbe:channelWavelengths": "double3",

@@ -27,6 +27,8 @@ _SHRINK = 1e-4
 # Points of a body that are tested, and how many pairs of points and triangles that may cost: about a second.
 _SAMPLES = 256
 _PAIRS = 2e7
+# Bodies that are compared with each other: so many boxes take a second, and more are gravel.
+_BODIES = 4096
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,14 @@ class _Body:
         normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
         return bool(np.abs(centred @ normal).max() <= _ROUNDING * np.abs(self.points).max())
 
+    @property
+    def is_sheet(self) -> bool:
+        """Whether it has no inside: one flat layer of faces, or two that enclose nothing."""
+        if not self.is_mesh:
+            return False
+        volume, uncertainty = self.volume
+        return self.is_flat or abs(volume) <= uncertainty
+
     @cached_property
     def box(self) -> tuple[F64, F64]:
         """World-space corners."""
@@ -124,12 +134,11 @@ class _Body:
         if self.is_mesh:
             triangles = self.drawn_in(self.triangles.reshape(-1, 3)).reshape(-1, 3, 3)
             begin, along = triangles, np.roll(triangles, -1, axis=1) - triangles
-            with np.errstate(
-                divide="ignore", invalid="ignore"
-            ):  # edges along an axis: ±inf, or nan on a face of the box
-                crossings = np.stack([(low - begin) / along, (high - begin) / along])
-            enter = np.fmax(np.nanmin(crossings, axis=0).max(axis=-1), 0.0)
-            leave = np.fmin(np.nanmax(crossings, axis=0).min(axis=-1), 1.0)
+            # Edges along an axis cross a side of the box at ±inf, or nowhere in particular if they lie in it: NaN.
+            with np.errstate(divide="ignore", invalid="ignore"):
+                low_side, high_side = (low - begin) / along, (high - begin) / along
+            enter = np.fmax(np.fmax.reduce(np.fmin(low_side, high_side), axis=-1), 0.0)
+            leave = np.fmin(np.fmin.reduce(np.fmax(low_side, high_side), axis=-1), 1.0)
             met = enter < leave
             found += [begin[met] + ((enter[met] + leave[met]) / 2)[:, None] * along[met], triangles.mean(axis=1)]
         inner = np.concatenate(found)
@@ -161,13 +170,23 @@ def _bodies(reading: Reading) -> list[_Body]:
         return []
     document = described.document
     found = []
-    for item in document["groups"][document["root"]]["items"]:
+    for item, transform in _placed(document, document["root"], np.eye(4)):
+        shape = document["shapes"][item["target"]["shape"]]
         material = _solid_material(reading, described, item)
-        if material is not None:
-            transform = np.array(item.get("transform", np.eye(4)), np.float64).reshape(4, 4)
-            shape = document["shapes"][item["target"]["shape"]]
+        # What is flattened to nothing is not rendered.
+        if material is not None and ("mesh" in shape or "sphere" in shape) and np.linalg.det(transform) != 0.0:
             found.append(_Body(item["path"], shape, described.arrays, transform, material))
     return [body for body in found if np.isfinite(body.points).all() and len(body.points)]
+
+
+def _placed(document: dict[str, Any], group: int, transform: F64) -> Iterator[tuple[dict[str, Any], F64]]:
+    """Return the placed shapes of a group and of those in it, each with its transform to the world."""
+    for item in document["groups"][group]["items"]:
+        own = np.array(item.get("transform", np.eye(4)), np.float64).reshape(4, 4)
+        if "group" in item["target"]:
+            yield from _placed(document, item["target"]["group"], own @ transform)
+        else:
+            yield item, own @ transform
 
 
 def _solid_material(reading: Reading, described: Description, item: dict[str, Any]) -> CompiledMaterial | None:
@@ -205,10 +224,9 @@ def closed(reading: Reading) -> Iterator[Finding]:
 
 
 def thickness(reading: Reading) -> Iterator[Finding]:
-    """Tell of sheets: one flat layer of faces, or two that enclose nothing."""
+    """Tell of sheets, which have no inside."""
     for body, is_closed in _meshes(reading):
-        volume, uncertainty = body.volume
-        if body.is_flat or (is_closed and abs(volume) <= uncertainty):
+        if body.is_flat or (is_closed and body.is_sheet):
             yield reading.found(
                 "abbe:GlassThickness",
                 "glass-sheet",
@@ -244,9 +262,10 @@ def overlapping(reading: Reading) -> Iterator[Finding]:
     """Tell of two different glasses in one place with nothing to decide which is there.
 
     A body within another is fine: the last one entered counts. What is told of is a surface that lies partly inside the
-    other body and partly outside. Each pair of shapes and materials is told of once.
+    other body and partly outside. Each pair of shapes and materials is told of once, and of very many bodies only the
+    first are looked at.
     """
-    bodies = reading.once("bodies", lambda: _bodies(reading))
+    bodies = [body for body in reading.once("bodies", lambda: _bodies(reading))[:_BODIES] if not body.is_sheet]
     if len(bodies) < 2:
         return
     low, high = (np.array([body.box[side] for body in bodies]) for side in (0, 1))

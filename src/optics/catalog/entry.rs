@@ -14,14 +14,15 @@ pub struct Entry {
     line: &'static str,
 }
 
-/// The cells of a line, as the head of `catalog.tsv` numbers them.
+/// The cells of a line, as the head of `catalog.tsv` counts them. The second one, the qualifier's key, is there to be sorted
+/// by and searched for.
 #[derive(Clone, Copy)]
 enum Cell {
-    Key,
-    Qualifier,
-    Name,
+    Key = 0,
+    Name = 2,
     Category,
     Status,
+    Common,
     Page,
     Title,
     Reference,
@@ -153,11 +154,6 @@ impl Entry {
         self.cell(Cell::Key)
     }
 
-    #[cfg(test)]
-    pub(super) fn qualifier(&self) -> &'static str {
-        self.cell(Cell::Qualifier)
-    }
-
     /// What kind of stuff it is.
     pub fn category(&self) -> Category {
         let name = self.cell(Cell::Category);
@@ -228,17 +224,23 @@ impl Entry {
         ValidRange { from: end(Cell::ValidFrom), to: end(Cell::ValidTo) }
     }
 
-    /// n(λ) as the source states it.
-    pub fn law(&self) -> Result<Law, String> {
+    /// The law as the source states it: the number of a formula of refractiveindex.info with its coefficients (λ in µm), or
+    /// `None` and a table of nm, n, nm, n …
+    pub fn source_law(&self) -> (Option<i32>, Vec<f64>) {
         let cell = self.cell(Cell::Law);
-        match cell.split_once(' ') {
-            Some(("formula", rest)) => {
-                let (number, coefficients) = rest.split_once(' ').unwrap_or((rest, ""));
-                let number = number.parse().map_err(|_| format!("formula {number} is none"))?;
-                Law::formula(number, &numbers(coefficients).collect::<Vec<_>>())
-            }
-            Some(("table", rest)) => Law::table(&pairs(rest)),
-            _ => Err(format!("{cell} is no law")),
+        let (kind, rest) = cell.split_once(' ').expect("a formula or a table (tested)");
+        let mut values = numbers(rest);
+        match kind {
+            "table" => (None, values.collect()),
+            _ => (values.next().map(|number| number as i32), values.collect()),
+        }
+    }
+
+    /// n(λ), not yet proved over any band.
+    pub fn law(&self) -> Result<Law, String> {
+        match self.source_law() {
+            (Some(number), coefficients) => Law::formula(number, &coefficients),
+            (None, table) => Law::table(&pairs(&table)),
         }
         .map_err(|problem| format!("{}: {problem}", self.name()))
     }
@@ -252,11 +254,11 @@ impl Entry {
     /// k(λ) as pairs of nm and k, increasing in λ; `None` where the source has none, or nothing but zeros.
     pub fn extinction(&self) -> Option<Vec<[f64; 2]>> {
         let cell = self.cell(Cell::Extinction);
-        (!cell.is_empty()).then(|| pairs(cell))
+        (!cell.is_empty()).then(|| pairs(&numbers(cell).collect::<Vec<_>>()))
     }
 
     /// Whether the bulk is transparent at the d line, measured by [`CLEAR_TRANSMITTANCE`].
-    fn is_clear(&self) -> bool {
+    pub(super) fn is_clear(&self) -> bool {
         let Some(table) = self.extinction() else { return true };
         let nm = lines::D.nanometers();
         let k = match table.partition_point(|[at, _]| *at < nm) {
@@ -275,15 +277,10 @@ impl Entry {
         self.page().starts_with("specs/")
     }
 
-    /// Whether an unknown transparent object may be made of it. `usual` is the target of the last alias before its line: of
-    /// several pages on a substance that one counts.
-    pub(super) fn is_medium_of_choice(&self, usual: &str) -> bool {
-        let suitable = match self.category() {
-            Category::Glass => self.is_makers() || self.name() == usual,
-            Category::Crystal | Category::Plastic | Category::Liquid => self.name() == usual,
-            Category::Filter | Category::Gas | Category::Metal | Category::Semiconductor | Category::Film => false,
-        };
-        suitable && self.is_clear()
+    /// Whether everyday objects may be made of it: any glass of a maker, and solids and liquids that one meets outside of
+    /// laboratories.
+    pub(super) fn is_common(&self) -> bool {
+        self.cell(Cell::Common) == "common"
     }
 
     /// Orders entries of equal merit.
@@ -316,7 +313,6 @@ fn numbers(cell: &str) -> impl Iterator<Item = f64> {
     cell.split(' ').map(|text| text.parse().expect("a number of ours (tested)"))
 }
 
-fn pairs(cell: &str) -> Vec<[f64; 2]> {
-    let values: Vec<f64> = numbers(cell).collect();
+fn pairs(values: &[f64]) -> Vec<[f64; 2]> {
     values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
 }

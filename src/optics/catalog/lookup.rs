@@ -59,8 +59,8 @@ fn lower_bound(order: impl Fn(&str) -> Ordering) -> usize {
     // Both are always the begin of a line, or the end of the data.
     let (mut low, mut high) = (0, DATA.len());
     while low < high {
-        let middle = low + (high - low) / 2;
-        let begin = DATA.as_bytes()[low..middle].iter().rposition(|&byte| byte == b'\n').map_or(low, |at| low + at + 1);
+        let middle = (low..=low + (high - low) / 2).rev().find(|&at| DATA.is_char_boundary(at)).unwrap_or(low);
+        let begin = DATA[low..middle].rfind('\n').map_or(low, |at| low + at + 1);
         let line = DATA[begin..].lines().next().unwrap_or_default();
         if is_comment(line) || order(line) == Ordering::Less {
             low = begin + line.len() + 1;

@@ -61,26 +61,18 @@ pub fn entries() -> impl Iterator<Item = Entry> {
     lookup::records().filter_map(|record| record.entry())
 }
 
-/// The entry whose n_d is nearest to `nd`, among what is solid or liquid, clear, and not one of several pages of the same
-/// substance: what a material with an index and no more may be made of.
+/// The entry whose n_d is nearest to `nd`, among glasses of the makers and what else clear everyday objects are made of
+/// (solids and liquids): what a material with an index and no more may be.
 ///
 /// Of two that are as near, the one that its maker prefers comes first, then the one whose name does.
 pub fn nearest(nd: f64) -> Entry {
     let mut best: Option<(f64, Entry)> = None;
-    let mut usual = "";
-    for record in lookup::records() {
-        let entry = match record {
-            Record::Alias { target, .. } => {
-                usual = target;
-                continue;
-            }
-            Record::Entry(entry) => entry,
-        };
+    for entry in entries().filter(Entry::is_common) {
         let distance = (entry.nd() - nd).abs();
         let closer = best.is_none_or(|(least, other)| {
             distance.total_cmp(&least).then_with(|| entry.preference().cmp(&other.preference())).is_lt()
         });
-        if closer && entry.is_medium_of_choice(usual) {
+        if closer && entry.is_clear() {
             best = Some((distance, entry));
         }
     }
@@ -91,8 +83,8 @@ pub fn nearest(nd: f64) -> Entry {
 fn resolved(target: &str) -> Entry {
     let (before, after) = target.split_once(':').expect("an alias names an entry in full");
     let (before, after) = (key(before), key(after));
-    lookup::exact(&after, &before)
-        .or_else(|| lookup::exact(&before, &after))
+    lookup::exact(&before, &after)
+        .or_else(|| lookup::exact(&after, &before))
         .expect("an alias names an entry that is there (tested)")
 }
 

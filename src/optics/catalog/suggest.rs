@@ -35,22 +35,25 @@ fn close_to(name: &str) -> Vec<String> {
     let most = 1 + bare.chars().count() / 5;
     let mut found: BTreeMap<String, Rank> = BTreeMap::new();
     for record in records() {
-        let (known, shown, entry) = match record {
-            Record::Alias { key, target } => (key, None, resolved(target)),
-            Record::Entry(entry) => (entry.key(), Some(entry.name()), entry),
+        let known = match record {
+            Record::Alias { key, .. } => key,
+            Record::Entry(entry) => entry.key(),
         };
         let mut edits = strsim::osa_distance(&bare, known);
         if asked.contains(':') {
-            // A maker that is wrong or misspelled must not hide the glass; that one is as good as a slip.
-            edits = if edits == 0 { 1 } else { edits + 1 };
-            if let Some(name) = shown {
-                edits = edits.min(strsim::osa_distance(&asked, &key(name)));
+            // A maker that is wrong or misspelled must not hide the glass: that is one slip.
+            edits += 1;
+            if let Record::Entry(entry) = record {
+                edits = edits.min(strsim::osa_distance(&asked, &key(entry.name())));
             }
         }
         if edits > most {
             continue;
         }
-        let shown = shown.map_or_else(|| shortest_name(known, entry), str::to_owned);
+        let (entry, shown) = match record {
+            Record::Alias { target, .. } => (resolved(target), shortest_name(known, resolved(target))),
+            Record::Entry(entry) => (entry, entry.name().to_owned()),
+        };
         let rank = (edits, !known.contains(&bare), entry.status());
         let best = found.entry(shown).or_insert(rank);
         *best = rank.min(*best);

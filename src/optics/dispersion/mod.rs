@@ -70,7 +70,7 @@ impl Dispersion {
     }
 
     fn everywhere(law: Law) -> Result<Self, String> {
-        Self::new(law, None, OutOfRange::Extrapolate)
+        Self::new(law, None, OutOfRange::default())
     }
 
     /// [`Law::constant`], valid everywhere.

@@ -59,10 +59,14 @@ impl IorRange {
         ior: impl Fn(f64) -> f64,
     ) -> Result<(), String> {
         let (above, below) = (quantity.of(self.above), quantity.of(self.below));
+        let refuse = |micrometers: f64| {
+            let problem = self.explain(micrometers, ior(micrometers), band);
+            format!("{problem}: check the coefficients and their units (µm)")
+        };
         // Asked for the good case, so that NaN is refused too.
         let inside = |micrometers: f64| {
             let sum = terms.iter().map(|term| term.at(micrometers)[0]).sum::<f64>() + constant;
-            if sum > above && sum < below { Ok(()) } else { Err(self.explain(micrometers, ior(micrometers), band)) }
+            if sum > above && sum < below { Ok(()) } else { Err(refuse(micrometers)) }
         };
         inside(band[0])?;
         inside(band[1])?;
@@ -87,15 +91,14 @@ impl IorRange {
             open.push([interval[0], middle]);
         }
         let undecided = open.last().map_or(band[0], |interval| interval[0]);
-        Err(self.explain(undecided, ior(undecided), band))
+        Err(refuse(undecided))
     }
 
     /// An index outside, or one that cannot be told from the limit, as an error.
     pub(super) fn explain(&self, micrometers: f64, ior: f64, band: [f64; 2]) -> String {
         let what = if ior.is_nan() { "the law has no real index".to_owned() } else { format!("the index is {ior:.6}") };
         format!(
-            "{what} at {:.3} nm, within {:.0}–{:.0} nm it must lie between {} and {}: check the coefficients and their units \
-             (µm)",
+            "{what} at {:.3} nm, within {:.0}–{:.0} nm it must lie between {} and {}",
             1e3 * micrometers,
             1e3 * band[0],
             1e3 * band[1],

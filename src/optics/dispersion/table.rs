@@ -39,10 +39,9 @@ impl Table {
         };
         let range =
             ValidRange { from: Wavelength::from_nanometers(first[0]), to: Wavelength::from_nanometers(last[0]) };
-        for [wavelength, ior] in entries {
-            IorRange::physical()
-                .check_value(*ior)
-                .map_err(|problem| format!("at {wavelength} nm {problem}: entries are (nm, n)"))?;
+        // No more than that: far from the visible metals have indices that they must not have in it.
+        if let Some([wavelength, ior]) = entries.iter().find(|entry| entry[1] <= 0.0) {
+            return Err(format!("the table has the index {ior} at {wavelength} nm: it must be positive"));
         }
         // µm by the same rounding as any wavelength that is looked up, so that entries are met exactly.
         let points: Vec<_> =
@@ -83,10 +82,8 @@ impl Table {
                 let parts = [piece[0], piece[1] * t, piece[2] * t * t, piece[3] * t * t * t];
                 let ior = Rounded { value: parts.iter().sum(), magnitude: parts.iter().map(|part| part.abs()).sum() };
                 if !range.contains(ior) {
-                    return Err(format!(
-                        "{}: the table is off there, or too coarse for a spline",
-                        range.explain(interval[0] + t, ior.value, band)
-                    ));
+                    let problem = range.explain(interval[0] + t, ior.value, band);
+                    return Err(format!("{problem}: the table is off there, or too coarse for a spline"));
                 }
             }
         }

@@ -68,14 +68,18 @@ pub enum OutOfRange {
 }
 
 impl OutOfRange {
-    /// The setting of a name as stages and scripts write it.
-    pub fn parse(text: &str) -> Option<Self> {
-        match text {
-            "clamp" => Some(Self::Clamp),
-            "error" => Some(Self::Error),
-            "extrapolate" => Some(Self::Extrapolate),
-            _ => None,
+    /// The name that stages and scripts write.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Clamp => "clamp",
+            Self::Error => "error",
+            Self::Extrapolate => "extrapolate",
         }
+    }
+
+    /// The setting of this name.
+    pub fn parse(text: &str) -> Option<Self> {
+        [Self::Clamp, Self::Error, Self::Extrapolate].into_iter().find(|setting| setting.name() == text)
     }
 }
 

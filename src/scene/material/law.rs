@@ -10,6 +10,7 @@ mod tests;
 
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
+use crate::optics::catalog;
 use crate::optics::dispersion::Dispersion;
 use crate::optics::media::Priority;
 
@@ -88,6 +89,17 @@ impl Form {
         std::iter::once(Self::Constant).chain(Self::BY_PRECEDENCE).find(|form| form.token() == token)
     }
 
+    /// The laws that `values` authors, by precedence.
+    fn authored(values: &Values<'_>) -> Result<Vec<Self>> {
+        let mut authored = Vec::new();
+        for form in Self::BY_PRECEDENCE {
+            if form.is_authored(values)? {
+                authored.push(form);
+            }
+        }
+        Ok(authored)
+    }
+
     /// The attribute that an error or a plan points to.
     fn place(self, values: &Values<'_>) -> String {
         values.place(match self {
@@ -123,6 +135,8 @@ impl Form {
 pub(super) struct Stated {
     /// The law, unscaled.
     pub(super) dispersion: Dispersion,
+    /// The material of the catalogue that it is the law of.
+    pub(super) glass: Option<catalog::Entry>,
     /// Where it stands, for the plan.
     pub(super) source: String,
 }
@@ -148,55 +162,39 @@ impl<'a> Authored<'a> {
             if values.text(LAW)?.is_some() {
                 return Ok(Some(values));
             }
-            for form in Form::BY_PRECEDENCE {
-                if form.is_authored(values)? {
-                    return Ok(Some(values));
-                }
+            if !Form::authored(values)?.is_empty() {
+                return Ok(Some(values));
             }
         }
         Ok(None)
     }
 
+    /// The place that states the law and the form that counts there: what `abbe:dispersion:law` says, or the first.
+    fn decided(&self) -> Result<Option<(&Values<'a>, Form)>> {
+        let Some(values) = self.stating()? else { return Ok(None) };
+        let form = match values.text(LAW)? {
+            Some(token) => Form::of_token(token),
+            None => Form::authored(values)?.first().copied(),
+        };
+        match form {
+            Some(form) => Ok(Some((values, form))),
+            None => values.refuse(
+                LAW,
+                "author glass, sellmeier, cauchy, formula, table, abbeNumber or constant, or nothing to infer it",
+            ),
+        }
+    }
+
     /// The law, if one is stated. `shader_ior` is the index that n_d = 0 refers to.
     pub(super) fn law(&self, shader_ior: f64, diagnostics: &mut Diagnostics) -> Result<Option<Stated>> {
-        let Some(values) = self.stating()? else { return Ok(None) };
-        let mut authored = Vec::new();
-        for form in Form::BY_PRECEDENCE {
-            if form.is_authored(values)? {
-                authored.push(form);
-            }
-        }
-        let form = match values.text(LAW)? {
-            Some(token) => match Form::of_token(token) {
-                Some(form) => {
-                    warn_of_silenced(form, &authored, values, diagnostics)?;
-                    form
-                }
-                None => {
-                    return values.refuse(
-                        LAW,
-                        "author glass, sellmeier, cauchy, formula, table, abbeNumber or constant, or nothing to infer it",
-                    );
-                }
-            },
-            None => {
-                if let [first, _, ..] = authored[..] {
-                    let names: Vec<_> = authored.iter().map(|form| form.token()).collect();
-                    diagnostics.warn(
-                        "several-dispersion-laws",
-                        values.place(LAW),
-                        format!("{} are authored, {} is used: author the law", names.join(", "), first.token()),
-                    );
-                }
-                authored[0]
-            }
-        };
-        let dispersion = compile::dispersion(form, values, shader_ior, diagnostics)?;
+        let Some((values, form)) = self.decided()? else { return Ok(None) };
+        warn_of_several(form, values, diagnostics)?;
+        let (dispersion, glass) = compile::dispersion(form, values, shader_ior, diagnostics)?;
         let source = match form {
             Form::Constant => values.place(LAW),
             _ => form.place(values),
         };
-        Ok(Some(Stated { dispersion, source }))
+        Ok(Some(Stated { dispersion, glass, source }))
     }
 
     /// Names every attribute that is none of ours.
@@ -244,8 +242,20 @@ impl<'a> Authored<'a> {
     }
 }
 
-/// An explicit law decides, but what it overrules was authored on purpose, too.
-fn warn_of_silenced(form: Form, authored: &[Form], values: &Values<'_>, diagnostics: &mut Diagnostics) -> Result<()> {
+/// Names what is authored beside `form` and has no effect, whether a rule or the author overrules it.
+fn warn_of_several(form: Form, values: &Values<'_>, diagnostics: &mut Diagnostics) -> Result<()> {
+    let authored = Form::authored(values)?;
+    if values.text(LAW)?.is_none() {
+        if authored.len() > 1 {
+            let names: Vec<_> = authored.iter().map(|form| form.token()).collect();
+            diagnostics.warn(
+                "several-dispersion-laws",
+                values.place(LAW),
+                format!("{} are authored, {} is used: author the law", names.join(", "), form.token()),
+            );
+        }
+        return Ok(());
+    }
     let mut silenced = Vec::new();
     for &other in authored.iter().filter(|&&other| other != form) {
         // A constant index is that of nd; an Abbe number of 0 says the same as it does.

@@ -274,7 +274,7 @@ fn preview_surface_opacity_is_glass_or_a_hole() {
     assert!(matches!(kind(under), Kind::PassThrough));
     let over = json!({"opacity": float(0.4), "opacityThreshold": float(0.3)});
     assert!(matches!(kind(over), Kind::Opaque));
-    assert!(matches!(kind(json!({"metallic": float(1.0), "roughness": float(0.0)})), Kind::Mirror));
+    assert!(matches!(kind(json!({"metallic": float(1.0), "roughness": float(0.0)})), Kind::Mirror { .. }));
     assert!(matches!(kind(json!({"metallic": float(1.0)})), Kind::Opaque));
 }
 
@@ -348,7 +348,6 @@ fn wrong_numbers_are_refused_where_they_stand() {
             json!({"abbe:dispersion:sellmeier:b": doubles(&[1.0]), "abbe:dispersion:sellmeier:c": doubles(&[0.3])}),
             "</M>.abbe:dispersion:sellmeier:b: ",
         ),
-        (json!({"abbe:glass": {"type": "string", "value": "SCHOTT:N-BK7"}}), "</M>.abbe:glass: is \"SCHOTT:N-BK7\""),
         (
             json!({"abbe:dispersion:cauchy": doubles(&[1.5]), "abbe:dispersion:validRange": {"type": "double2", "value": [600.0, 700.0]}}),
             "</M>.abbe:dispersion:validRange: ",
@@ -363,13 +362,53 @@ fn wrong_numbers_are_refused_where_they_stand() {
 }
 
 #[test]
-fn scalar_ior_policies_that_need_the_catalogue_are_usage_errors() {
-    assert_eq!(ScalarIor::parse("constant", "--scalar-ior").expect("is known"), ScalarIor::Constant);
-    for text in ["nearestGlass", "nearest-glass", "other"] {
-        let error = ScalarIor::parse(text, "--scalar-ior").expect_err("is refused");
-        assert_eq!(error.exit_code(), 2);
-        assert!(error.to_string().starts_with("--scalar-ior: "), "{error}");
+fn scalar_ior_policies_are_constant_and_nearest_glass() {
+    for text in ["", "constant"] {
+        assert_eq!(ScalarIor::parse(text, "--scalar-ior").expect("is known"), ScalarIor::Constant);
     }
+    for text in ["nearestGlass", "nearest-glass"] {
+        assert_eq!(ScalarIor::parse(text, "--scalar-ior").expect("is known"), ScalarIor::NearestGlass);
+    }
+    let error = ScalarIor::parse("other", "--scalar-ior").expect_err("is refused");
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.to_string().starts_with("--scalar-ior: "), "{error}");
+}
+
+#[test]
+fn nearest_glass_gives_a_lone_index_the_curve_of_the_catalogue() {
+    let nearest = Context { scalar_ior: ScalarIor::NearestGlass, ..CONTEXT };
+    let with_ior = |ior: f64, abbe_number: f64| {
+        let inputs = json!({"transmission": float(1.0), "specular_IOR": float(ior), "transmission_dispersion": float(abbe_number)});
+        let mut diagnostics = Diagnostics::default();
+        let glass = compile(&shaded("ND_standard_surface_surfaceshader", inputs), &nearest, &mut diagnostics);
+        (glass.expect("compiles"), diagnostics)
+    };
+    let curve = |glass: &Material| match &glass.kind {
+        Kind::Dielectric { dispersion, .. } => dispersion.clone(),
+        kind => panic!("{kind:?}"),
+    };
+    for ior in [1.333, 1.46, 1.5168, 1.6, 1.78472, 2.0] {
+        let (glass, _) = with_ior(ior, 0.0);
+        let distance = (curve(&glass).at(lines::D).ior - ior).abs();
+        assert!(distance < 0.005, "{}", glass.chosen);
+        assert!(curve(&glass).abbe_number().is_some(), "{}", glass.chosen);
+        assert!(glass.chosen.contains("nearest is "), "{}", glass.chosen);
+    }
+    // N-SF11 and its equivalents have V_d from 25.6 to 25.8.
+    close(curve(&with_ior(1.78472, 0.0).0).abbe_number().expect("disperses"), 25.7, 0);
+    let (none, diagnostics) = with_ior(1.0, 0.0);
+    assert!(curve(&none).is_constant());
+    assert_eq!(kinds_of(&diagnostics), ["no-near-glass"]);
+    // Where dispersion is authored, or said to be none, the policy says nothing.
+    let (authored, _) = with_ior(1.5168, 30.0);
+    close(curve(&authored).abbe_number().expect("disperses"), 30.0, 9);
+    let mut constant = shaded("ND_standard_surface_surfaceshader", json!({"transmission": float(1.0)}));
+    constant.abbe.insert(
+        "abbe:dispersion:vd".to_owned(),
+        description::Authored { type_name: "double".to_owned(), value: json!(0.0) },
+    );
+    let glass = compile(&constant, &nearest, &mut Diagnostics::default()).expect("compiles");
+    assert!(curve(&glass).is_constant());
 }
 
 #[test]
@@ -413,4 +452,60 @@ fn priorities_of_arnold_let_the_higher_win_and_ours_come_first() {
         description::Authored { type_name: "int".to_owned(), value: json!(5) },
     );
     assert_eq!(priority(&arnold), Priority::lower_wins(5));
+}
+
+#[test]
+fn metals_are_what_their_attributes_state() {
+    let metal = |abbe: serde_json::Value| {
+        let mut metal = preview(abbe);
+        metal.surface = serde_json::from_value(shader(
+            "UsdPreviewSurface",
+            json!({"metallic": float(1.0), "roughness": float(0.0)}),
+        ))
+        .expect("is a shader");
+        metal
+    };
+    let conductor = |abbe: serde_json::Value| {
+        let (metal, diagnostics) = compiled(&metal(abbe));
+        match metal.kind {
+            Kind::Mirror { conductor } => {
+                (conductor, kinds_of(&diagnostics).iter().map(|k| (*k).to_owned()).collect::<Vec<_>>())
+            }
+            kind => panic!("{kind:?}: {}", metal.chosen),
+        }
+    };
+    let pairs = |values: [[f64; 2]; 2]| json!({"type": "double2[]", "value": values});
+    let law = json!({"abbe:dispersion:cauchy": doubles(&[0.2]), "abbe:extinction:table": pairs([[400.0, 3.0], [800.0, 5.0]])});
+    let (stated, warnings) = conductor(law);
+    let Conductor { dispersion, extinction } = stated.expect("is stated");
+    close(dispersion.at(lines::D).ior, 0.2, 15);
+    close(extinction.at(crate::spectrum::Wavelength::from_nanometers(600.0)), 4.0, 12);
+    assert!(warnings.is_empty());
+    assert!(conductor(json!({})).0.is_none());
+    // Gold, by name: yellow, so k grows towards the red.
+    let named = |name: &str| conductor(json!({"abbe:glass": {"type": "string", "value": name}}));
+    let gold = named("gold").0.expect("is a metal");
+    assert!(gold.extinction.at(lines::C) > gold.extinction.at(lines::F));
+    assert!(gold.dispersion.at(lines::D).ior < 1.0);
+    for half in [
+        json!({"abbe:dispersion:vd": double(30.0)}),
+        json!({"abbe:extinction:table": pairs([[400.0, 3.0], [800.0, 5.0]])}),
+        json!({"abbe:glass": {"type": "string", "value": "SCHOTT:N-BK7"}}),
+    ] {
+        let (none, warnings) = conductor(half);
+        assert!(none.is_none());
+        assert_eq!(warnings, ["no-metal"]);
+    }
+}
+
+#[test]
+fn single_precision_is_read_as_it_was_written() {
+    // What a stage's `float inputs:ior = 1.52` crosses as.
+    let single = f64::from(1.52_f32);
+    let glass = shaded("UsdPreviewSurface", json!({"opacity": float(0.0), "ior": float(single)}));
+    assert!(law(&glass).at(lines::D).ior.to_bits() == 1.52_f64.to_bits());
+    let wide = shaded("UsdPreviewSurface", json!({"opacity": float(0.0), "ior": double(single)}));
+    assert!(law(&wide).at(lines::D).ior.to_bits() == single.to_bits());
+    let third = shaded("UsdPreviewSurface", json!({"opacity": float(0.0), "ior": double(4.0 / 3.0)}));
+    assert!(law(&third).at(lines::D).ior.to_bits() == (4.0_f64 / 3.0).to_bits());
 }

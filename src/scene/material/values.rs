@@ -48,9 +48,10 @@ impl<'a> Values<'a> {
         let Some(authored) = self.map.get(name) else { return Ok(None) };
         let number = match &authored.value {
             Value::Array(parts) if !parts.is_empty() && parts.len() <= 4 => {
-                parts.iter().map(finite).sum::<Option<f64>>().map(|sum| sum / parts.len() as f64)
+                let parts: Option<Vec<_>> = parts.iter().map(|part| meant(authored, part)).collect();
+                parts.map(|parts| mean(&parts))
             }
-            value => finite(value),
+            value => meant(authored, value),
         };
         number.map(Some).ok_or_else(|| self.error(name, "author a finite number"))
     }
@@ -61,11 +62,12 @@ impl<'a> Values<'a> {
         let color = match &authored.value {
             Value::Array(parts) => match parts[..] {
                 [ref r, ref g, ref b] | [ref r, ref g, ref b, _] => {
-                    finite(r).zip(finite(g)).zip(finite(b)).map(|((r, g), b)| [r, g, b])
+                    let [r, g, b] = [r, g, b].map(|part| meant(authored, part));
+                    r.zip(g).zip(b).map(|((r, g), b)| [r, g, b])
                 }
                 _ => None,
             },
-            value => finite(value).map(|grey| [grey; 3]),
+            value => meant(authored, value).map(|grey| [grey; 3]),
         };
         color.map(Some).ok_or_else(|| self.error(name, "author a colour of three finite numbers"))
     }
@@ -73,7 +75,7 @@ impl<'a> Values<'a> {
     /// A number declared `double` by the schema: single precision is accepted with a warning.
     pub(super) fn double(&self, name: &str, diagnostics: &mut Diagnostics) -> Result<Option<f64>> {
         self.warn_of_single_precision(name, diagnostics);
-        match self.map.get(name).map(|a| finite(&a.value)) {
+        match self.map.get(name).map(|a| meant(a, &a.value)) {
             None => Ok(None),
             Some(Some(number)) => Ok(Some(number)),
             Some(None) => self.refuse(name, "author a finite number of type double"),
@@ -159,6 +161,30 @@ impl<'a> Values<'a> {
 /// A finite number. JSON has no NaN and no infinity: bridges write them as null or as a word, neither of which is one.
 fn finite(value: &Value) -> Option<f64> {
     value.as_f64().filter(|number| number.is_finite())
+}
+
+/// The mean; of equal numbers exactly that number.
+fn mean(parts: &[f64]) -> f64 {
+    parts[0] + parts.iter().map(|part| part - parts[0]).sum::<f64>() / parts.len() as f64
+}
+
+/// A number as it was meant. USD hands 1.52 of type float over as 1.5199999809…: of the numbers that are the same float,
+/// the one with the fewest digits was written.
+fn meant(authored: &Authored, value: &Value) -> Option<f64> {
+    let number = finite(value)?;
+    let single = number as f32;
+    let is_single =
+        matches!(scalar_type(authored), "float" | "color") && f64::from(single).to_bits() == number.to_bits();
+    // The shortest text that names a float is what Display gives.
+    if is_single { single.to_string().parse().ok() } else { Some(number) }
+}
+
+/// `float` of float, float3 and float[]; `color` of the single precision colours.
+fn scalar_type(authored: &Authored) -> &str {
+    match authored.type_name.as_str() {
+        "color3f" | "color4f" => "color",
+        name => name.trim_end_matches("[]").trim_end_matches(|c: char| c.is_ascii_digit()),
+    }
 }
 
 /// A value for an error line, cut where it is long.

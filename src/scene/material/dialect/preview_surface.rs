@@ -62,7 +62,8 @@ impl Dialect for PreviewSurface {
         if metalness.value >= THRESHOLD && !inputs.switch(USE_SPECULAR_WORKFLOW, diagnostics)? {
             return Ok(Response::Metal { why: metalness.to_string(), rough: inputs.is_rough(ROUGHNESS, diagnostics)? });
         }
-        Ok(Response::Opaque(format!("opacity {opacity}")))
+        let masked = if threshold > 0.0 { format!(", not under opacityThreshold {threshold}") } else { String::new() };
+        Ok(Response::Opaque(format!("opacity {opacity}{masked}")))
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {

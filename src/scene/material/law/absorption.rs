@@ -1,7 +1,8 @@
 //! What our attributes say about absorption: k(λ), or the internal transmittance of a plate.
 
 use super::super::values::Values;
-use super::{Authored, EXTINCTION, THICKNESS, TRANSMITTANCE};
+use super::compile::glass;
+use super::{Authored, EXTINCTION, Form, GLASS, THICKNESS, TRANSMITTANCE};
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 use crate::optics::dispersion::check_wavelengths;
@@ -28,7 +29,17 @@ impl StatedAbsorption {
 }
 
 impl Authored<'_> {
-    /// The first place that states absorption; of two tables at one place k is used, with a warning.
+    /// The first table of absorption that is authored, whatever stands in it.
+    pub(in super::super) fn absorption_place(&self) -> Option<String> {
+        let of = |values: &Values<'_>| {
+            let name = [EXTINCTION, TRANSMITTANCE].into_iter().find(|name| values.has(name));
+            name.map(|name| values.place(name))
+        };
+        self.places.iter().find_map(of)
+    }
+
+    /// The first place that states absorption; of two tables at one place k is used, with a warning. Else k(λ) of the
+    /// catalogue, if the law is that of a named material.
     pub(in super::super) fn absorption(&self, diagnostics: &mut Diagnostics) -> Result<Option<StatedAbsorption>> {
         for values in &self.places {
             let extinction = values.pairs(EXTINCTION, diagnostics)?;
@@ -64,7 +75,9 @@ impl Authored<'_> {
                 return Ok(Some(StatedAbsorption::InternalTransmittance { entries, thickness_mm, place }));
             }
         }
-        Ok(None)
+        let Some((values, Form::Glass)) = self.decided()? else { return Ok(None) };
+        let place = values.place(GLASS);
+        Ok(glass(values)?.extinction().map(|entries| StatedAbsorption::Extinction { entries, place }))
     }
 }
 

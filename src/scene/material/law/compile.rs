@@ -6,16 +6,22 @@ use super::{
 };
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
+use crate::optics::catalog::{self, Entry};
 use crate::optics::dispersion::{Dispersion, Law, OutOfRange, ValidRange};
 use crate::spectrum::Wavelength;
 
-/// The law of `form` at the place of `values`. `shader_ior` is the index that n_d = 0 refers to.
+/// The law of `form` at the place of `values`, and the material of the catalogue that it is. `shader_ior` is the index that
+/// n_d = 0 refers to.
 pub(super) fn dispersion(
     form: Form,
     values: &Values<'_>,
     shader_ior: f64,
     diagnostics: &mut Diagnostics,
-) -> Result<Dispersion> {
+) -> Result<(Dispersion, Option<Entry>)> {
+    let glass = match form {
+        Form::Glass => Some(glass(values)?),
+        _ => None,
+    };
     let law = law(form, values, shader_ior, diagnostics)?;
     let out_of_range = match values.text(OUT_OF_RANGE)? {
         None => OutOfRange::default(),
@@ -28,8 +34,9 @@ pub(super) fn dispersion(
     if let Some(range) = authored {
         law.check_range(range, out_of_range).or_else(|problem| values.refuse(VALID_RANGE, problem))?;
     }
+    let valid = authored.or_else(|| glass.map(|entry| entry.valid_range()));
     let dispersion =
-        Dispersion::new(law, authored, out_of_range).map_err(|problem| Error::scene(form.place(values), problem))?;
+        Dispersion::new(law, valid, out_of_range).map_err(|problem| Error::scene(form.place(values), problem))?;
     if let Some(range) = dispersion.valid_range()
         && dispersion.out_of_range() == OutOfRange::Clamp
         && !range.contains_the_visible()
@@ -44,7 +51,15 @@ pub(super) fn dispersion(
             ),
         );
     }
-    Ok(dispersion)
+    Ok((dispersion, glass))
+}
+
+/// The material of the catalogue that is named.
+pub(super) fn glass(values: &Values<'_>) -> Result<Entry> {
+    match values.text(GLASS)? {
+        Some(name) => catalog::find(name).or_else(|problem| values.refuse(GLASS, problem)),
+        None => values.refuse(GLASS, "the law needs it: author a name of the catalogue, such as \"SCHOTT:N-BK7\""),
+    }
 }
 
 fn law(form: Form, values: &Values<'_>, shader_ior: f64, diagnostics: &mut Diagnostics) -> Result<Law> {
@@ -58,7 +73,8 @@ fn law(form: Form, values: &Values<'_>, shader_ior: f64, diagnostics: &mut Diagn
             let nd = index(values, shader_ior, diagnostics)?;
             let Some(vd) = values.double(VD, diagnostics)? else {
                 if values.text(LAW)?.is_some() {
-                    return values.refuse(VD, "law abbeNumber needs it: author the Abbe number, or 0 for no dispersion");
+                    return values
+                        .refuse(VD, "law abbeNumber needs it: author the Abbe number, or 0 for no dispersion");
                 }
                 return Law::constant(nd).map_err(at(ND));
             };
@@ -96,10 +112,7 @@ fn law(form: Form, values: &Values<'_>, shader_ior: f64, diagnostics: &mut Diagn
             Some(entries) => Law::table(&entries).or_else(|problem| values.refuse(TABLE, problem)),
             None => values.refuse(TABLE, "the law needs it: author pairs (nm, n)"),
         },
-        Form::Glass => values.refuse(
-            GLASS,
-            "the glass catalogue is not part of this version: author its coefficients as abbe:dispersion:sellmeier:b and :c",
-        ),
+        Form::Glass => glass(values)?.law().or_else(|problem| values.refuse(GLASS, problem)),
     }
 }
 

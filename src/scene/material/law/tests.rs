@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::super::{Context, Kind, Material, ScalarIor, compile};
 use super::absorption::StatedAbsorption;
 use super::*;
+use crate::optics::Extinction;
 use crate::optics::dispersion::OutOfRange;
 use crate::scene::description;
 use crate::spectrum::{Wavelength, lines};
@@ -110,6 +111,49 @@ fn each_formula_is_read_by_its_number() {
         let found = quiet(&formula(number, &coefficients)).at(lines::D).ior;
         assert!((found - ior).abs() < 1e-15 * 4.0, "formula {number}: {found} is not {ior}");
     }
+}
+
+#[test]
+fn a_named_glass_is_that_of_the_catalogue_with_its_range_and_its_absorption() {
+    // SCHOTT's data sheet: n_d = 1.51680, V_d = 64.17.
+    for name in ["SCHOTT:N-BK7", "schott: n bk7"] {
+        let glass = quiet(&json!({GLASS: token(name)}));
+        assert!((glass.at(lines::D).ior - 1.51680).abs() < 5e-6);
+        assert!((glass.abbe_number().expect("disperses") - 64.17).abs() < 5e-3);
+        assert!(glass.valid_range().is_some_and(|range| range.contains_the_visible()));
+    }
+    let by_law = quiet(&json!({LAW: token("glass"), GLASS: token("SCHOTT:N-BK7"), VALID_RANGE: range(300.0, 900.0)}));
+    assert_eq!(by_law.valid_range().map(|range| range.to_string()), Some("300 to 900 nm".to_owned()));
+    let scaled = quiet(&json!({GLASS: token("SCHOTT:N-BK7"), SCALE: double(2.0)}));
+    assert!((scaled.abbe_number().expect("disperses") - 64.17 / 2.0).abs() < 5e-3);
+    // k of the glass, unless absorption is authored, and only where the glass is the law.
+    let entry = catalog::find("SCHOTT:N-BK7").expect("is there");
+    let measured = entry.extinction().expect("SCHOTT states transmittances");
+    assert_eq!(
+        absorption(&json!({GLASS: token("SCHOTT:N-BK7")})),
+        Some(StatedAbsorption::Extinction { entries: measured, place: format!("</M>.{GLASS}") })
+    );
+    let own = [[400.0, 1e-8], [700.0, 0.0]];
+    assert_eq!(
+        absorption(&json!({GLASS: token("SCHOTT:N-BK7"), EXTINCTION: pairs(&own)})),
+        Some(StatedAbsorption::Extinction { entries: own.to_vec(), place: format!("</M>.{EXTINCTION}") })
+    );
+    assert_eq!(absorption(&json!({LAW: token("abbeNumber"), VD: double(30.0), GLASS: token("SCHOTT:N-BK7")})), None);
+}
+
+#[test]
+fn every_clear_material_of_the_catalogue_can_be_authored_by_its_name() {
+    let mut count = 0;
+    for entry in catalog::entries().filter(|entry| !entry.is_metal()) {
+        let material = json!({GLASS: token(entry.name())});
+        let (law, _) = dispersion(&material);
+        assert_eq!(law, entry.dispersion(OutOfRange::Clamp).expect("is a law"), "{}", entry.name());
+        if let Some(StatedAbsorption::Extinction { entries, .. }) = absorption(&material) {
+            Extinction::table(&entries).unwrap_or_else(|problem| panic!("{}: {problem}", entry.name()));
+        }
+        count += 1;
+    }
+    assert!(count > 500, "{count} entries");
 }
 
 #[test]
@@ -224,9 +268,18 @@ fn impossible_numbers_name_prim_attribute_and_remedy() {
             TABLE,
             "look like µm (0.4): nm are wanted, multiply them by 1000",
         ),
-        (json!({TABLE: pairs(&[[400.0, 0.0], [700.0, 1.49]])}), TABLE, "at 400 nm the index is 0"),
+        (
+            json!({TABLE: pairs(&[[400.0, 0.0], [700.0, 1.49]])}),
+            TABLE,
+            "has the index 0 at 400 nm: it must be positive",
+        ),
         (json!({TABLE: pairs(&[[900.0, 1.5], [1000.0, 1.49]])}), TABLE, "without the d line"),
         (json!({TABLE: doubles(&[400.0, 1.5])}), TABLE, "author a list of pairs of finite numbers of type double2[]"),
+        (json!({LAW: token("glass")}), GLASS, "author a name of the catalogue, such as \"SCHOTT:N-BK7\""),
+        (json!({GLASS: token("SCHOTT:N-BK77")}), GLASS, "N-BK7"),
+        (json!({GLASS: token("gold")}), GLASS, "is a metal, and light passes this surface"),
+        (json!({GLASS: double(1.5)}), GLASS, "is 1.5: author a token or string"),
+        (json!({GLASS: token("SCHOTT:N-BK7"), VALID_RANGE: range(0.4, 0.7)}), VALID_RANGE, "look like µm"),
         (json!({LAW: token("table")}), TABLE, "is not authored: the law needs it: author pairs (nm, n)"),
         (json!({TABLE: {"type": "double2[]", "value": [[400.0, null], [700.0, 1.5]]}}), TABLE, "finite numbers"),
         (json!({CAUCHY: doubles(&[1.5]), VALID_RANGE: range(0.4, 0.7)}), VALID_RANGE, "look like µm"),

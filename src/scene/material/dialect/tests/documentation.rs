@@ -122,12 +122,14 @@ fn the_documentation_lists_every_warning() {
     let documented: BTreeSet<String> =
         table(&document, "warning").into_iter().map(|row| row[0].trim_matches('`').to_owned()).collect();
     let mut sources = vec![root().join("src/scene/material.rs")];
-    for folder in ["src/scene/material", "src/scene/material/dialect"] {
-        for entry in fs::read_dir(root().join(folder)).expect("is there") {
+    let mut folders = vec![root().join("src/scene/material")];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("is there") {
             let path = entry.expect("is readable").path();
-            if path.extension().is_some_and(|extension| extension == "rs") && !path.ends_with("tests.rs") {
-                sources.push(path);
+            if path.file_stem().is_some_and(|stem| stem == "tests") {
+                continue;
             }
+            if path.is_dir() { &mut folders } else { &mut sources }.push(path);
         }
     }
     let warned: BTreeSet<String> = sources

@@ -48,7 +48,7 @@ fn word(kind: &Kind) -> String {
         Kind::Dielectric { rough, thin_walled, .. } => {
             format!("{}{}glass", if *thin_walled { "thin " } else { "" }, if *rough { "rough " } else { "" })
         }
-        Kind::Mirror => "mirror".to_owned(),
+        Kind::Mirror { .. } => "mirror".to_owned(),
         Kind::PassThrough => "cut out".to_owned(),
         Kind::Opaque => "opaque".to_owned(),
     }
