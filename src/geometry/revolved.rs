@@ -22,6 +22,7 @@ pub struct Revolved {
     radius: f64,
     bottom: f64,
     top: f64,
+    is_lens: bool,
 }
 
 /// One face of a lens: a conic and terms of higher order, in light's own direction +z.
@@ -196,7 +197,7 @@ impl Revolved {
                 return Err(format!("front and back cross at the radius {r}: make it thicker, or the edge smaller"));
             }
         }
-        Ok(Self::new(Axis::Z, lower, upper, edge))
+        Ok(Self { is_lens: true, ..Self::new(Axis::Z, lower, upper, edge) })
     }
 
     fn new(axis: Axis, lower: Vec<Section>, upper: Vec<Section>, radius: f64) -> Self {
@@ -211,7 +212,12 @@ impl Revolved {
         };
         let bottom = ends(&lower).into_iter().fold(f64::INFINITY, f64::min);
         let top = ends(&upper).into_iter().fold(f64::NEG_INFINITY, f64::max);
-        Self { axis, lower, upper, radius, bottom, top }
+        Self { axis, lower, upper, radius, bottom, top, is_lens: false }
+    }
+
+    /// Cylinders, cones and capsules are; lenses need not be.
+    pub(super) fn is_convex(&self) -> bool {
+        !self.is_lens
     }
 
     pub(super) fn bounds(&self) -> [DVec3; 2] {

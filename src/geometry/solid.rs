@@ -170,6 +170,15 @@ impl Solid {
         !matches!(self, Self::Rectangle(_))
     }
 
+    /// Whether a ray that has left it cannot meet it again.
+    pub(super) fn is_convex(&self) -> bool {
+        match self {
+            Self::Cuboid(_) => true,
+            Self::Rectangle(_) => false,
+            Self::Revolved(revolved) => revolved.is_convex(),
+        }
+    }
+
     /// Whether its normals move over its surface.
     pub fn is_curved(&self) -> bool {
         matches!(self, Self::Revolved(_))

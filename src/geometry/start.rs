@@ -194,6 +194,9 @@ impl Start<'_> {
                     let border = Border { distance: 0.0, primitive, leaving: inside };
                     return Some((Met { distance: 0.0, at_start: true }, border));
                 }
+                if !inside && solid.is_convex() {
+                    return None;
+                }
                 let borders = solid.borders(origin, direction, Some(primitive));
                 match borders.next(inside, primitive, solid.is_closed()) {
                     None if inside && solid.is_closed() => solid.way_out(origin, direction, primitive, KEPT * error),
