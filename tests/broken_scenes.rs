@@ -78,7 +78,7 @@ fn placement(path: &str, target: Target) -> Placement {
 }
 
 fn group(path: &str, items: Vec<Placement>) -> Group {
-    Group { path: path.into(), items }
+    Group { path: path.into(), items, instances: vec![] }
 }
 
 #[test]

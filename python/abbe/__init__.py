@@ -17,6 +17,7 @@ from ._api import Plan, Progress, Scene, integrators, merge, render
 from ._core import Film, __version__
 from .catalog import Glass, glass, glasses, nearest_glass
 from .errors import AbbeError, StageError, UsageError, UsdMissingError
+from .manifest import Manifest
 from .optics import Dispersion, Reflected, Refracted, Transferred, reflect, refract, transfer
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "Dispersion",
     "Film",
     "Glass",
+    "Manifest",
     "Plan",
     "Progress",
     "Reflected",

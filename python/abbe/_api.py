@@ -141,6 +141,9 @@ class Scene:
         variants: Sequence[str] = (),
         overrides: Mapping[str, Any] | Sequence[str] = (),
         search_paths: Sequence[str | os.PathLike[str]] = (),
+        session_layer: str | os.PathLike[str] | None = None,
+        mask: Sequence[str] = (),
+        payloads: str = "all",
         missing: str = "warn",
         scalar_ior: str | None = None,
         strict: bool = False,
@@ -158,6 +161,9 @@ class Scene:
         variants : selections such as ``"/World/Ball{material=glass}"``
         overrides : values such as ``"/World/Glass.inputs:ior=1.6"``, or a mapping from attribute path to value
         search_paths : folders in which relative asset paths are looked up after the stage's own
+        session_layer : a layer stronger than all of the stage, which is not changed
+        mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
+        payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
         missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
         scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
         strict : a stage without a camera is an error
@@ -188,6 +194,9 @@ class Scene:
             variants=variants,
             overrides=overrides,
             search_paths=search_paths,
+            session_layer=session_layer,
+            mask=mask,
+            payloads=payloads,
             missing=missing,
             scalar_ior=scalar_ior,
             strict=strict,
@@ -403,6 +412,9 @@ def render(
     variants: Sequence[str] = (),
     overrides: Mapping[str, Any] | Sequence[str] = (),
     search_paths: Sequence[str | os.PathLike[str]] = (),
+    session_layer: str | os.PathLike[str] | None = None,
+    mask: Sequence[str] = (),
+    payloads: str = "all",
     missing: str = "warn",
     scalar_ior: str | None = None,
     strict: bool = False,
@@ -431,7 +443,8 @@ def render(
     threads : all of the machine's if None
     crop : x0, y0, x1, y1 in pixels, half-open, y down
     sample_range : begin and end, half-open: a part that :func:`merge` joins with others
-    purposes, variants, overrides, search_paths, missing, scalar_ior : as for :meth:`Scene.from_stage`
+    purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, scalar_ior : as for
+        :meth:`Scene.from_stage`
     strict : what would be a warning about the request, or a missing camera, is an error
     progress : called about ten times a second; ``print`` will do
 
@@ -462,6 +475,9 @@ def render(
         variants=variants,
         overrides=overrides,
         search_paths=search_paths,
+        session_layer=session_layer,
+        mask=mask,
+        payloads=payloads,
         missing=missing,
         scalar_ior=scalar_ior,
         strict=strict,

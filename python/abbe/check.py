@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ._image import PARTIAL, ExrImage, NotAnExrError, UnreadableImageError, channel_name, read_exr
+from .manifest import Manifest
 
 __all__ = ["CheckReport", "Difference", "Failure", "LayerSummary", "check"]
 
@@ -509,14 +510,14 @@ class _Checker:
             attribute = _MANIFESTS[base]
             text = self.image.text(attribute)
             try:
-                entries = None if text is None else json.loads(text)
-            except json.JSONDecodeError:
-                entries = None
-            if not isinstance(entries, list):
-                self.fail(f"attribute {attribute}, which the ids of {aov} point into, is no JSON array")
+                paths = None if text is None else Manifest(text)
+            except ValueError:
+                paths = None
+            if paths is None:
+                self.fail(f"attribute {attribute}, which the ids of {aov} point into, is no manifest of paths")
             else:
-                message = f"must not exceed the {len(entries)} entries of {attribute}"
-                self.fail_where(first > len(entries), message, names[0], first)
+                message = f"must not exceed the {len(paths)} paths of {attribute}"
+                self.fail_where(first > len(paths), message, names[0], first)
 
     def relations(self, layer_of: Mapping[str, str]) -> None:
         """Counts that contain others."""

@@ -12,7 +12,6 @@ OKLab by B. Ottosson, "A perceptual color space for image processing", 2020 (pub
 from __future__ import annotations
 
 import colorsys
-import json
 import math
 import os
 import re
@@ -26,6 +25,7 @@ import numpy as np
 from ._files import replacing
 from ._image import channel_name, read_exr
 from .errors import AbbeError, UsageError
+from .manifest import Manifest
 
 __all__ = ["Tile", "contact_sheet", "tiles_of", "write_preview"]
 
@@ -229,14 +229,13 @@ def _facts(attributes: Mapping[str, Any]) -> list[str]:
     return facts
 
 
-def _manifest(aov: str, attributes: Mapping[str, Any]) -> tuple[str, ...]:
+def _manifest(aov: str, attributes: Mapping[str, Any]) -> Sequence[str]:
     attribute = _MANIFESTS.get(aov.removeprefix("refracted_").removesuffix("_id"))
     text = attributes.get(attribute) if attribute else None
     try:
-        entries = json.loads(text) if isinstance(text, str) else []
-    except json.JSONDecodeError:
-        entries = []
-    return tuple(str(entry) for entry in entries) if isinstance(entries, list) else ()
+        return Manifest(text) if isinstance(text, str) else ()
+    except ValueError:
+        return ()
 
 
 def contact_sheet(tiles: Sequence[Tile], *, title: str = "") -> Any:

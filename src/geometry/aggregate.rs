@@ -1,26 +1,29 @@
 //! All instances of a scene under one tree.
 
 use std::cmp::Ordering;
+use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::mesh::{Mesh, MeshHit};
-use super::placed::{ObjectRay, Placed};
+use super::placed::{Frame, ObjectRay, Placed, is_invertible};
 use super::start::{Met, Relation, Start, behind, relation};
 use super::tree::{Bounds, Tree};
-use super::{Departures, Hit, Instance, Ray, Shape};
+use super::{Departures, Hit, Instance, InstanceArray, Location, Numbering, Ray, Shape};
 use crate::ray::LocalSurface;
-
-/// Above this number of members [`Aggregate::touching`] would take longer than what it saves.
-const MANY: usize = 4096;
 
 /// Everything that rays can meet.
 #[derive(Debug)]
 pub struct Aggregate {
-    placed: Vec<Placed>,
+    singles: Vec<(Arc<Shape>, Frame)>,
+    arrays: Vec<InstanceArray>,
+    numbering: Numbering,
+    /// The point of the stage's world that is render space's zero.
+    origin: DVec3,
     tree: Tree,
-    /// Which instance each primitive of the tree is: those without extent are left out.
-    instances: Vec<u32>,
+    /// Which instance each primitive of the tree is, where not all are in it: those without extent are left out.
+    instances: Option<Vec<u32>>,
     /// Largest condition and largest translation of all instances.
     spread: f64,
     farthest: f64,
@@ -31,16 +34,78 @@ impl Aggregate {
     ///
     /// Transforms are finite and not singular; whoever reads them refuses others.
     pub fn build(instances: &[Instance], origin: DVec3) -> Self {
-        let placed: Vec<Placed> = instances.iter().map(|instance| Placed::new(instance, origin)).collect();
-        let (instances, bounds): (Vec<u32>, Vec<_>) =
-            (0..).zip(&placed).filter_map(|(i, placed)| placed.bounds().map(|bounds| (i, bounds))).unzip();
-        Self {
-            tree: Tree::build(bounds.len(), |i| bounds[i]),
-            instances,
-            spread: placed.iter().map(Placed::condition).fold(1.0, f64::max),
-            farthest: placed.iter().map(|p| p.translation.abs().max_element()).fold(0.0, f64::max),
-            placed,
+        Self::with_arrays(instances, Vec::new(), origin)
+    }
+
+    /// Builds the tree over single instances and arrays of them, numbered as by [`Numbering`].
+    ///
+    /// Places of an array may be singular: nothing stands there.
+    pub fn with_arrays(singles: &[Instance], mut arrays: Vec<InstanceArray>, origin: DVec3) -> Self {
+        arrays.retain(|array| !array.is_empty());
+        let numbering = Numbering::new(singles.len(), arrays.iter().map(|a| (a.places.len(), a.parts.len())));
+        let singles =
+            singles.iter().map(|i| (Arc::clone(&i.shape), Frame::new(&i.world_from_object, origin))).collect();
+        let mut all = Self {
+            singles,
+            arrays,
+            numbering,
+            origin,
+            tree: Tree::default(),
+            instances: None,
+            spread: 1.0,
+            farthest: 0.0,
+        };
+        let count = all.numbering.len();
+        let in_tree: Vec<u32> = (0..count).into_par_iter().filter(|&i| all.bounds_of(i).is_some()).collect();
+        // The largest of some numbers does not depend on their grouping.
+        let (spread, farthest) = in_tree
+            .par_iter()
+            .map(|&i| all.with(i, |placed| (placed.condition(), placed.translation.abs().max_element())))
+            .reduce(|| (1.0, 0.0), |a, b| (f64::max(a.0, b.0), f64::max(a.1, b.1)));
+        (all.spread, all.farthest) = (spread, farthest);
+        all.instances = (in_tree.len() < count as usize).then_some(in_tree);
+        let primitives = all.instances.as_ref().map_or(count as usize, Vec::len);
+        all.tree = Tree::build(primitives, |i| {
+            all.bounds_of(all.instance(i as u32)).expect("only instances with bounds are in the tree")
+        });
+        all
+    }
+
+    /// The instance that is the primitive `i` of the tree.
+    fn instance(&self, i: u32) -> u32 {
+        self.instances.as_ref().map_or(i, |instances| instances[i as usize])
+    }
+
+    /// Calls `f` with an instance made ready: a single one as it is kept, one of an array as it is computed.
+    fn with<R>(&self, instance: u32, f: impl FnOnce(Placed<'_>) -> R) -> R {
+        match self.numbering.locate(instance) {
+            Location::Single(i) => {
+                let (shape, frame) = &self.singles[i];
+                f(Placed { shape, frame })
+            }
+            Location::InArray { array, place, part } => {
+                let array = &self.arrays[array];
+                let frame = Frame::new(&array.world_from_object(place, part), self.origin);
+                f(Placed { shape: &array.parts[part].shape, frame: &frame })
+            }
         }
+    }
+
+    fn shape(&self, instance: u32) -> &Shape {
+        match self.numbering.locate(instance) {
+            Location::Single(i) => &self.singles[i].0,
+            Location::InArray { array, part, .. } => &self.arrays[array].parts[part].shape,
+        }
+    }
+
+    /// Bounds of an instance in render space; `None` where it has no extent or its place is singular.
+    fn bounds_of(&self, instance: u32) -> Option<Bounds> {
+        if let Location::InArray { array, place, part } = self.numbering.locate(instance)
+            && !is_invertible(&self.arrays[array].world_from_object(place, part))
+        {
+            return None;
+        }
+        self.with(instance, |placed| placed.bounds())
     }
 
     /// The nearest surface that the ray meets; equal distances are decided by (instance, primitive).
@@ -50,18 +115,19 @@ impl Aggregate {
         let mut nearest = Nearest { hit: None, limit: f64::INFINITY };
         if departures.is_none() {
             self.tree.walk(ray.origin, ray.direction, 0.0, f64::INFINITY, self.spread, |i, _| {
-                let instance = self.instances[i as usize];
-                self.placed[instance as usize].intersect(ray, instance, None, &mut nearest);
+                let instance = self.instance(i);
+                self.with(instance, |placed| placed.intersect(ray, instance, None, &mut nearest));
                 nearest.limit
             });
         } else {
-            let reach = departures.crossings().iter().map(|c| self.placed[c.instance as usize].reach(c.primitive));
+            let reach =
+                departures.crossings().iter().map(|c| self.with(c.instance, |placed| placed.reach(c.primitive)));
             let magnitude = ray.origin.abs().max_element() + reach.fold(0.0, f64::max);
             let from = -behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest));
             self.tree.walk(ray.origin, ray.direction, from, f64::INFINITY, self.spread, |i, _| {
-                let instance = self.instances[i as usize];
+                let instance = self.instance(i);
                 let standing = Some((departures, magnitude));
-                self.placed[instance as usize].intersect(ray, instance, standing, &mut nearest);
+                self.with(instance, |placed| placed.intersect(ray, instance, standing, &mut nearest));
                 nearest.limit
             });
         }
@@ -71,13 +137,14 @@ impl Aggregate {
     /// A surface that passes through the start of the ray, within rounding, and that the ray has not crossed there. Casts
     /// no further than that.
     pub fn coincident(&self, ray: &Ray, departures: &Departures) -> Option<Hit> {
-        let reach = departures.crossings().iter().map(|c| self.placed[c.instance as usize].reach(c.primitive));
+        let reach = departures.crossings().iter().map(|c| self.with(c.instance, |placed| placed.reach(c.primitive)));
         let magnitude = ray.origin.abs().max_element() + reach.fold(0.0, f64::max);
         let about = behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest));
         let mut nearest = Nearest { hit: None, limit: about };
         self.tree.walk(ray.origin, ray.direction, -about, about, self.spread, |i, _| {
-            let instance = self.instances[i as usize];
-            self.placed[instance as usize].intersect(ray, instance, Some((departures, magnitude)), &mut nearest);
+            let instance = self.instance(i);
+            let standing = Some((departures, magnitude));
+            self.with(instance, |placed| placed.intersect(ray, instance, standing, &mut nearest));
             nearest.limit
         });
         nearest.hit.filter(|hit| hit.at_start)
@@ -89,21 +156,21 @@ impl Aggregate {
     /// faces that a ray beside them crosses.
     pub fn crossings(&self, ray: &Ray, f: &mut dyn FnMut(&Hit)) {
         self.tree.walk(ray.origin, ray.direction, 0.0, f64::INFINITY, self.spread, |i, limit| {
-            let instance = self.instances[i as usize];
-            self.placed[instance as usize].crossings(ray, instance, f);
+            let instance = self.instance(i);
+            self.with(instance, |placed| placed.crossings(ray, instance, f));
             limit
         });
     }
 
     /// The hit point, on the surface to rounding, and the surface around it.
     pub fn local_surface(&self, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
-        self.placed[hit.instance as usize].local_surface(ray, hit)
+        self.with(hit.instance, |placed| placed.local_surface(ray, hit))
     }
 
-    /// Texture coordinates at a hit; `None` where none are authored (always, for analytic shapes). `_point`, the refined hit point,
-    /// is for shapes whose coordinates come from the position.
+    /// Texture coordinates at a hit; `None` where none are authored (always, for analytic shapes). `_point`, the refined hit
+    /// point, is for shapes whose coordinates come from the position.
     pub fn uv(&self, hit: &Hit, _point: DVec3) -> Option<[f64; 2]> {
-        match &*self.placed[hit.instance as usize].shape {
+        match self.shape(hit.instance) {
             Shape::Sphere(_) | Shape::Solid(_) => None,
             Shape::Mesh(mesh) => mesh.uv(hit.primitive, hit.barycentric),
         }
@@ -111,7 +178,7 @@ impl Aggregate {
 
     /// The material slot that was hit: 0 for faces in no subset, k + 1 for the k-th subset.
     pub fn slot(&self, hit: &Hit) -> u32 {
-        match &*self.placed[hit.instance as usize].shape {
+        match self.shape(hit.instance) {
             Shape::Sphere(_) | Shape::Solid(_) => 0,
             Shape::Mesh(mesh) => mesh.slot(hit.primitive),
         }
@@ -119,56 +186,51 @@ impl Aggregate {
 
     /// Lower and upper bounds of everything in render space; `None` without extent.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
-        let all = self.placed.iter().filter_map(Placed::bounds).reduce(|a, b| a.union(&b))?;
+        let all = (0..self.numbering.len())
+            .into_par_iter()
+            .filter_map(|i| self.bounds_of(i))
+            .reduce_with(|a, b| a.union(&b))?;
         Some([all.min, all.max])
     }
 
-    /// For each instance that `is_member`, whether its bounds meet those of another member: only then can their surfaces
-    /// coincide. More than 4096 members are not compared, and count as touching.
-    pub fn touching(&self, is_member: impl Fn(u32) -> bool) -> Vec<bool> {
-        let mut touching = vec![false; self.placed.len()];
-        let members: Vec<(usize, Bounds)> = (0..self.placed.len())
-            .filter(|&i| is_member(i as u32))
-            .filter_map(|i| Some((i, self.placed[i].bounds()?)))
-            .collect();
-        if members.len() > MANY {
-            members.iter().for_each(|&(i, _)| touching[i] = true);
-            return touching;
-        }
+    /// Whether the bounds of an instance meet those of another one that `is_member`: only then can their surfaces coincide.
+    pub fn is_touching(&self, instance: u32, is_member: impl Fn(u32) -> bool) -> bool {
+        let Some(bounds) = self.bounds_of(instance) else { return false };
         // Surfaces that coincide under different transforms differ by rounding of their coordinates.
-        let meet = |a: &Bounds, b: &Bounds| {
-            let reach = a.min.abs().max(a.max.abs()).max(b.min.abs()).max(b.max.abs());
-            let margin = reach.max_element() * self.spread * 2f64.powi(-46);
-            a.min.cmple(b.max + margin).all() && b.min.cmple(a.max + margin).all()
-        };
-        for (k, (i, a)) in members.iter().enumerate() {
-            for (j, b) in &members[k + 1..] {
-                if !(touching[*i] && touching[*j]) && meet(a, b) {
-                    (touching[*i], touching[*j]) = (true, true);
-                }
-            }
-        }
-        touching
+        let margin = |reach: f64| reach * self.spread * 2f64.powi(-46);
+        let widest = margin(self.tree.reach());
+        let search = Bounds { min: bounds.min - widest, max: bounds.max + widest };
+        self.tree.any_meeting(&search, |i| {
+            let other = self.instance(i);
+            other != instance
+                && is_member(other)
+                && self.bounds_of(other).is_some_and(|other| {
+                    let margin = margin(bounds.reach().max(other.reach()));
+                    bounds.min.cmple(other.max + margin).all() && other.min.cmple(bounds.max + margin).all()
+                })
+        })
     }
 
     /// What `intersect` finds by asking every primitive: the law that trees are tested against.
     #[doc(hidden)]
     pub fn intersect_without_tree(&self, ray: &Ray) -> Option<Hit> {
         let mut nearest = Nearest { hit: None, limit: f64::INFINITY };
-        for (instance, placed) in (0..).zip(&self.placed) {
-            let object = placed.ray(ray);
-            match &*placed.shape {
-                Shape::Sphere(_) | Shape::Solid(_) => placed.intersect(ray, instance, None, &mut nearest),
-                Shape::Mesh(mesh) => {
-                    let mut sides = Sides::new(f64::INFINITY);
-                    mesh.every_crossing(object.origin, object.direction, |hit| {
-                        sides.offer(object.hit(instance, &hit));
-                    });
-                    if let Some(hit) = sides.first(mesh, ray) {
-                        nearest.offer(hit);
+        for instance in (0..self.numbering.len()).filter(|&i| self.bounds_of(i).is_some()) {
+            self.with(instance, |placed| {
+                let object = placed.ray(ray);
+                match placed.shape {
+                    Shape::Sphere(_) | Shape::Solid(_) => placed.intersect(ray, instance, None, &mut nearest),
+                    Shape::Mesh(mesh) => {
+                        let mut sides = Sides::new(f64::INFINITY);
+                        mesh.every_crossing(object.origin, object.direction, |hit| {
+                            sides.offer(object.hit(instance, &hit));
+                        });
+                        if let Some(hit) = sides.first(mesh, ray) {
+                            nearest.offer(hit);
+                        }
                     }
                 }
-            }
+            });
         }
         nearest.hit
     }
@@ -259,7 +321,7 @@ impl ObjectRay {
     }
 }
 
-impl Placed {
+impl Placed<'_> {
     fn intersect(&self, ray: &Ray, instance: u32, standing: Option<(&Departures, f64)>, nearest: &mut Nearest) {
         let object = self.ray(ray);
         let start = standing.map(|(departures, magnitude)| Start {
@@ -268,7 +330,7 @@ impl Placed {
             arrival: self.inverse * departures.arrival(),
             magnitude: self.start_magnitude(magnitude, &object),
         });
-        match &*self.shape {
+        match self.shape {
             Shape::Mesh(mesh) => {
                 let mut sides = Sides::new(nearest.limit);
                 mesh.walk(object.origin, object.direction, start.as_ref(), sides.limit * object.stretch, |hit| {
@@ -309,7 +371,7 @@ impl Placed {
 
     fn crossings(&self, ray: &Ray, instance: u32, f: &mut dyn FnMut(&Hit)) {
         let object = self.ray(ray);
-        match &*self.shape {
+        match self.shape {
             Shape::Mesh(mesh) => mesh.walk(object.origin, object.direction, None, f64::INFINITY, |hit| {
                 f(&object.hit(instance, &hit));
                 f64::INFINITY

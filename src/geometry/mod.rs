@@ -15,6 +15,7 @@ mod asphere;
 mod buffer;
 mod cuboid;
 mod departures;
+mod instances;
 mod mesh;
 mod placed;
 mod polygons;
@@ -29,15 +30,16 @@ mod tree;
 mod triangle;
 mod walk;
 
-use std::sync::Arc;
-
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 
 pub use aggregate::Aggregate;
 pub use buffer::Buffer;
 pub use cuboid::{Cuboid, Rectangle};
 pub use departures::Departures;
+pub(crate) use instances::affine;
+pub use instances::{Instance, InstanceArray, Location, Numbering, Part};
 pub use mesh::{Mesh, MeshReport};
+pub(crate) use placed::is_invertible;
 pub use polygons::{Interpolation, PolygonMesh, PrimvarView};
 pub use revolved::{Cap, Revolved};
 pub use solid::{Axis, Solid};
@@ -80,13 +82,4 @@ pub enum Shape {
     Solid(Solid),
     /// Triangles.
     Mesh(Mesh),
-}
-
-/// A shape, placed.
-#[derive(Clone, Debug)]
-pub struct Instance {
-    /// What is placed; shared by all its instances.
-    pub shape: Arc<Shape>,
-    /// Its place in the stage's world; not singular.
-    pub world_from_object: DAffine3,
 }

@@ -1,12 +1,12 @@
 //! An instance made ready: transforms both ways, and how large the numbers are that they round.
 
-use std::sync::Arc;
+use std::ops::Deref;
 
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::start::UNIT_ROUNDOFF;
 use super::tree::Bounds;
-use super::{Instance, Ray, Shape};
+use super::{Ray, Shape};
 
 /// Relative deviation from a similarity that rounding alone explains: a few products of matrices.
 const SIMILARITY: f64 = 64.0 * f64::EPSILON;
@@ -14,9 +14,23 @@ const SIMILARITY: f64 = 64.0 * f64::EPSILON;
 const BOX_ERRORS: f64 = 32.0;
 
 /// A shape in render space.
-#[derive(Debug)]
-pub(super) struct Placed {
-    pub(super) shape: Arc<Shape>,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed<'a> {
+    pub(super) shape: &'a Shape,
+    pub(super) frame: &'a Frame,
+}
+
+impl Deref for Placed<'_> {
+    type Target = Frame;
+
+    fn deref(&self) -> &Frame {
+        self.frame
+    }
+}
+
+/// Where an instance stands.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
     /// Render space from object space.
     pub(super) linear: DMat3,
     pub(super) translation: DVec3,
@@ -37,12 +51,12 @@ pub(super) struct ObjectRay {
     pub(super) stretch: f64,
 }
 
-impl Placed {
-    pub(super) fn new(instance: &Instance, origin: DVec3) -> Self {
-        let DAffine3 { matrix3: linear, translation } = instance.world_from_object;
+impl Frame {
+    /// For a transform that [`is_invertible`], in a render space whose zero is the world's point `origin`.
+    pub(super) fn new(world_from_object: &DAffine3, origin: DVec3) -> Self {
+        let DAffine3 { matrix3: linear, translation } = *world_from_object;
         let inverse = inverse(linear);
         Self {
-            shape: Arc::clone(&instance.shape),
             linear,
             translation: translation - origin,
             inverse,
@@ -57,47 +71,9 @@ impl Placed {
         (self.norm * self.inverse_norm).max(1.0)
     }
 
-    /// Bounds in render space, outward by the rounding of the transforms; `None` for a shape without extent.
-    pub(super) fn bounds(&self) -> Option<Bounds> {
-        let about =
-            |[min, max]: [DVec3; 2]| (self.point(0.5 * (min + max)), absolute(self.linear) * (0.5 * (max - min)));
-        let (center, half) = match &*self.shape {
-            Shape::Sphere(sphere) => {
-                // The extent of the ellipsoid L·S² along an axis is the length of that row of L.
-                let rows = self.linear.transpose();
-                let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
-                (self.translation, half * sphere.radius())
-            }
-            Shape::Solid(solid) => about(solid.bounds()),
-            Shape::Mesh(mesh) => about(mesh.bounds()?),
-        };
-        let magnitude = self.reach_of(self.extent()) * self.condition();
-        let error = DVec3::splat(BOX_ERRORS * UNIT_ROUNDOFF * magnitude);
-        Some(Bounds { min: center - half - error, max: center + half + error })
-    }
-
-    /// Largest coordinate of the shape in object space.
-    fn extent(&self) -> f64 {
-        match &*self.shape {
-            Shape::Sphere(sphere) => sphere.radius(),
-            Shape::Solid(solid) => solid.extent(),
-            Shape::Mesh(mesh) => mesh.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element()),
-        }
-    }
-
     /// |L||v| + |t| for coordinates up to `extent`.
     fn reach_of(&self, extent: f64) -> f64 {
         self.norm * extent + self.translation.abs().max_element()
-    }
-
-    /// |L||v| + |t| at a primitive: what rounding a point of it in render space is relative to.
-    pub(super) fn reach(&self, primitive: u32) -> f64 {
-        let extent = match &*self.shape {
-            Shape::Sphere(sphere) => sphere.radius(),
-            Shape::Solid(solid) => solid.extent(),
-            Shape::Mesh(mesh) => mesh.corners(primitive).into_iter().map(|p| p.abs().max_element()).fold(0.0, f64::max),
-        };
-        self.reach_of(extent)
     }
 
     /// The size of the numbers rounded on the way of a ray's start to object space (`start.rs`). `magnitude` is |p| + reach
@@ -122,6 +98,54 @@ impl Placed {
     pub(super) fn covector(&self, n: DVec3) -> DVec3 {
         self.inverse.transpose() * n
     }
+}
+
+impl Placed<'_> {
+    /// Bounds in render space, outward by the rounding of the transforms; `None` for a shape without extent.
+    pub(super) fn bounds(&self) -> Option<Bounds> {
+        let about =
+            |[min, max]: [DVec3; 2]| (self.point(0.5 * (min + max)), absolute(self.linear) * (0.5 * (max - min)));
+        let (center, half) = match self.shape {
+            Shape::Sphere(sphere) => {
+                // The extent of the ellipsoid L·S² along an axis is the length of that row of L.
+                let rows = self.linear.transpose();
+                let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+                (self.translation, half * sphere.radius())
+            }
+            Shape::Solid(solid) => about(solid.bounds()),
+            Shape::Mesh(mesh) => about(mesh.bounds()?),
+        };
+        let magnitude = self.reach_of(self.extent()) * self.condition();
+        let error = DVec3::splat(BOX_ERRORS * UNIT_ROUNDOFF * magnitude);
+        Some(Bounds { min: center - half - error, max: center + half + error })
+    }
+
+    /// Largest coordinate of the shape in object space.
+    fn extent(&self) -> f64 {
+        match self.shape {
+            Shape::Sphere(sphere) => sphere.radius(),
+            Shape::Solid(solid) => solid.extent(),
+            Shape::Mesh(mesh) => mesh.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element()),
+        }
+    }
+
+    /// |L||v| + |t| at a primitive: what rounding a point of it in render space is relative to.
+    pub(super) fn reach(&self, primitive: u32) -> f64 {
+        let extent = match self.shape {
+            Shape::Sphere(sphere) => sphere.radius(),
+            Shape::Solid(solid) => solid.extent(),
+            Shape::Mesh(mesh) => mesh.corners(primitive).into_iter().map(|p| p.abs().max_element()).fold(0.0, f64::max),
+        };
+        self.reach_of(extent)
+    }
+}
+
+/// Whether the inverse exists to working precision: the volume is compared with that of the columns' box, so scale is free.
+pub(crate) fn is_invertible(transform: &DAffine3) -> bool {
+    let m = transform.matrix3;
+    let box_volume = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
+    let inverse = transform.inverse();
+    m.determinant().abs() > 1e-14 * box_volume && inverse.is_finite()
 }
 
 /// The inverse, by way of a power of two so that determinants of tiny and huge transforms do not under- or overflow.

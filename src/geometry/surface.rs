@@ -12,9 +12,9 @@ use crate::ray::{Curvature, LocalSurface, NormalField};
 /// Below this share of the corner normals an interpolated one is nothing but their f32 rounding: sixteen of its steps.
 const VANISHING: f64 = 16.0 / 16_777_216.0;
 
-impl Placed {
+impl Placed<'_> {
     pub(super) fn local_surface(&self, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
-        match &*self.shape {
+        match self.shape {
             Shape::Mesh(mesh) => self.facet(mesh, hit),
             Shape::Sphere(sphere) => self.ellipsoid(*sphere, ray, hit),
             Shape::Solid(solid) => self.piece(solid, ray, hit),

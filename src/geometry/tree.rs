@@ -85,6 +85,11 @@ impl Bounds {
     pub(crate) fn union(&self, other: &Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
+
+    /// Largest coordinate.
+    pub(crate) fn reach(&self) -> f64 {
+        self.min.abs().max(self.max.abs()).max_element()
+    }
 }
 
 impl Tree {
@@ -95,8 +100,7 @@ impl Tree {
         }
         assert!(count < 1 << 31, "primitives are counted in 31 bits");
         let all = (0..count).into_par_iter().map(&bounds_of).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
-        let largest = all.min.abs().max(all.max.abs()).max_element();
-        let (_, exponent) = libm::frexp(largest);
+        let (_, exponent) = libm::frexp(all.reach());
         // 2^-1022 … 2^1022: beyond, the boxes lose digits but stay bounds.
         let scale = libm::ldexp(1.0, (-exponent).clamp(-1022, 1022));
         let boxes: Vec<Aabb> = (0..count)
@@ -107,14 +111,51 @@ impl Tree {
             })
             .collect();
         let binary = agglomerate(&boxes);
-        let ((nodes, depth), order) = match widen(&binary.nodes) {
+        let ((mut nodes, depth), order) = match widen(&binary.nodes) {
             Some(wide) => (wide, binary.primitive_indices),
             None => {
                 let (binary, order) = halve(&boxes);
                 (widen(&binary).expect("halving 2^31 primitives takes 31 binary levels"), order)
             }
         };
+        // Trees are built once and kept: what the vector grew beyond its end would be kept with them.
+        nodes.shrink_to_fit();
         Self { nodes, order, stack: stack_of(depth), scale, bounds: [all.min * scale, all.max * scale] }
+    }
+}
+
+impl Tree {
+    /// Largest coordinate of everything.
+    pub(super) fn reach(&self) -> f64 {
+        if self.nodes.is_empty() {
+            0.0
+        } else {
+            self.bounds[0].abs().max(self.bounds[1].abs()).max_element() / self.scale
+        }
+    }
+
+    /// Whether `visit` is true of any primitive whose box meets `bounds`.
+    pub(super) fn any_meeting(&self, bounds: &Bounds, mut visit: impl FnMut(u32) -> bool) -> bool {
+        // Outward, as the boxes are.
+        let (low, high) = (round_down(bounds.min * self.scale), round_up(bounds.max * self.scale));
+        let mut open = if self.nodes.is_empty() { vec![] } else { vec![0] };
+        while let Some(node) = open.pop() {
+            let node: &Node = &self.nodes[node];
+            for lane in 0..4 {
+                let meets =
+                    |axis: usize| node.bounds[0][axis][lane] <= high[axis] && low[axis] <= node.bounds[1][axis][lane];
+                if !(meets(0) && meets(1) && meets(2)) {
+                    continue;
+                }
+                let (first, count) = (node.first[lane] as usize, node.count[lane] as usize);
+                if count == 0 {
+                    open.push(first);
+                } else if self.order[first..first + count].iter().any(|&primitive| visit(primitive)) {
+                    return true;
+                }
+            }
+        }
+        false
     }
 }
 
@@ -246,6 +287,35 @@ mod tests {
         let (binary, order) = halve(&boxes);
         assert_eq!(order.len(), 1000);
         assert!(widen(&binary).is_some());
+    }
+
+    #[test]
+    fn boxes_that_meet_are_those_that_a_look_at_all_finds() {
+        // Boxes of many sizes about a curve that fills space, some of them points.
+        let boxes: Vec<Bounds> = (0..500)
+            .map(|i| {
+                let t = f64::from(i);
+                let centre = DVec3::new((1.7 * t).sin(), (2.3 * t).sin(), (3.1 * t).cos()) * 1e3;
+                let half = DVec3::splat(f64::from(i % 7) * 9.0);
+                Bounds { min: centre - half, max: centre + half }
+            })
+            .collect();
+        let tree = Tree::build(boxes.len(), |i| boxes[i]);
+        assert!((tree.reach() - boxes.iter().map(Bounds::reach).fold(0.0, f64::max)).abs() <= 1e-9);
+        for search in &boxes {
+            let meets = |b: &Bounds| b.min.cmple(search.max).all() && search.min.cmple(b.max).all();
+            let mut found = Vec::new();
+            tree.any_meeting(search, |i| {
+                found.push(i as usize);
+                false
+            });
+            assert!((0..boxes.len()).filter(|&i| meets(&boxes[i])).all(|i| found.contains(&i)));
+            assert!(found.len() < 100, "most boxes are far away");
+            assert!(tree.any_meeting(search, |i| meets(&boxes[i as usize])));
+        }
+        let nowhere = Bounds { min: DVec3::splat(2e3), max: DVec3::splat(3e3) };
+        assert!(!tree.any_meeting(&nowhere, |_| true));
+        assert!(!Tree::default().any_meeting(&nowhere, |_| true));
     }
 
     #[test]

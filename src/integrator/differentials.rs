@@ -290,7 +290,7 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
     ) {
         let task = self.prepared.task;
         let view: &View<'_> = task.view;
-        let object = met.map(|met| &view.scene.objects[met.hit.instance as usize]);
+        let object = met.map(|met| view.scene.objects.ids(met.hit.instance));
         match value {
             SurfaceValue::Depth => out.add(layer, scalar(met.map(|met| task.camera.depth(met.point)))),
             SurfaceValue::Position => out.add(layer, met.map(|met| view.origin + met.point)),

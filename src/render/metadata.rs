@@ -64,8 +64,8 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
     let has_ids =
         |what: &str| plan.layers.iter().any(|layer| layer.aov.merge == Merge::First && layer.aov.name.contains(what));
     for (name, paths, wanted) in [
-        ("abbe:primManifest", &scene.prims, has_ids("prim_id")),
-        ("abbe:instanceManifest", &scene.instances, has_ids("instance_id")),
+        ("abbe:primManifest", scene.prims.entries(), has_ids("prim_id")),
+        ("abbe:instanceManifest", scene.instances.entries(), has_ids("instance_id")),
     ] {
         if wanted {
             set(name, Attribute::Text(json!(paths).to_string()));

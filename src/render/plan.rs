@@ -18,9 +18,9 @@ use crate::geometry::Shape;
 use crate::integrator::transmittance::absorbs;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
 use crate::optics::dispersion::Dispersion;
+use crate::scene::Scene;
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
-use crate::scene::{Object, Scene};
 use crate::spectrum::{Wavelength, lines};
 
 /// One layer to be rendered.
@@ -305,9 +305,9 @@ fn reasons(
         if uv.is_empty() { "no AOV asks for them".into() } else { format!("{} for them", list(&uv, "asks", "ask")) };
     note(!uv.is_empty(), "texture coordinates", why);
     if needs.columns > Columns::None {
-        match scene.objects.iter().find(|object| is_smooth_glass(scene, object)) {
-            Some(object) => {
-                let path = &scene.prims[object.prim_id as usize - 1];
+        match scene.objects.kinds().find(|(shape, _, materials)| is_smooth_glass(scene, shape, materials)) {
+            Some((_, prim_id, _)) => {
+                let path = scene.prims.path(prim_id).unwrap_or_default();
                 note(true, "∂N, how normals move", format!("{path} is glass with a curved or smooth-shaded surface"));
             }
             None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
@@ -334,15 +334,15 @@ fn list(names: &[&str], one: &str, many: &str) -> String {
     }
 }
 
-/// Whether the object is glass whose normals move over its surface.
-fn is_smooth_glass(scene: &Scene, object: &Object) -> bool {
+/// Whether a shape with these materials is glass whose normals move over its surface.
+fn is_smooth_glass(scene: &Scene, shape: &Shape, material_ids: &[u32]) -> bool {
     let is_glass = |id: &u32| id.checked_sub(1).is_some_and(|i| scene.materials[i as usize].has_interior());
-    let is_smooth = match &*object.shape {
+    let is_smooth = match shape {
         Shape::Sphere(_) => true,
         Shape::Solid(solid) => solid.is_curved(),
         Shape::Mesh(mesh) => mesh.has_normals(),
     };
-    is_smooth && object.material_ids.iter().any(is_glass)
+    is_smooth && material_ids.iter().any(is_glass)
 }
 
 impl fmt::Display for Plan {

@@ -89,7 +89,8 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
         End::Exhausted => json!({ "kind": "too many events" }),
         End::Surface(met) => json!({
             "kind": "surface",
-            "prim": scene.prims[scene.objects[met.hit.instance as usize].prim_id as usize - 1],
+            "prim": scene.prims.path(scene.objects.ids(met.hit.instance).prim_id),
+            "instance": scene.instances.path(scene.objects.ids(met.hit.instance).instance_id),
             "material": (met.material_id as usize).checked_sub(1).map(|i| &scene.materials[i].path),
             "primitive": met.hit.primitive,
             "position": array(view.origin + met.point),

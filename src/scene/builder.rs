@@ -6,48 +6,114 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use glam::{DAffine3, DMat4};
 use rayon::prelude::*;
 
-use super::description::{self, Array, Description, Document, Element, Group, Placement, Target};
+use super::description::{self, Array, Description, Document, Element};
+use super::manifest::Manifest;
 use super::material::{self, Context, Material, ScalarIor};
+use super::objects::{Object, ObjectArray, Objects, PartIds};
 use super::solids;
-use super::{Counts, Object, Scene};
+use super::unroll::{self, Placed, Unrolled};
+use super::{Counts, Scene};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::geometry::{Buffer, Interpolation, Mesh, MeshReport, PolygonMesh, PrimvarView, Shape, Sphere};
-
-/// More objects than this cannot be addressed; nested groups reach it quickly, so they are counted before they are unrolled.
-const MAX_OBJECTS: u64 = 1 << 31;
+use crate::geometry::{
+    Buffer, InstanceArray, Interpolation, Mesh, MeshReport, Part, PolygonMesh, PrimvarView, Shape, Sphere,
+};
 
 /// Checks and compiles `description`.
 pub fn build(description: Description) -> Result<Scene> {
     let document = &description.document;
     let mut diagnostics = document.warnings.clone();
     check_stage(document)?;
-    check_groups(document)?;
-    let placed = unroll(document, &mut diagnostics)?;
+    unroll::check_groups(&description)?;
+    let Unrolled { singles, prototypes, arrays, mut instances } = unroll::unroll(&description, &mut diagnostics)?;
 
+    let placed = || singles.iter().chain(prototypes.iter().flatten());
     let mut used = vec![false; document.shapes.len()];
-    placed.iter().for_each(|p| used[p.shape] = true);
+    placed().for_each(|p| used[p.shape] = true);
     let shapes = build_shapes(&description, &used, &mut diagnostics)?;
-    let (materials, material_ids) = build_materials(document, &placed, &mut diagnostics)?;
+    let (materials, material_ids) = build_materials(document, placed(), &mut diagnostics)?;
 
-    let mut prims = Manifest::default();
-    let mut instances = Manifest::default();
-    let mut slots = HashMap::<Vec<u32>, Arc<[u32]>>::new();
-    let mut objects = Vec::with_capacity(placed.len());
-    let mut triangles = 0;
-    let mut seen = vec![false; shapes.len()];
-    for Placed { shape, transform, placement, instance } in placed {
-        let prim_id = prims.id(&placement.path);
-        let instance_id = instance.map_or(0, |path| instances.id(path));
-        let Some((compiled, report)) = &shapes[shape] else { continue };
-        let material_of = |index: Option<usize>| index.map_or(0, |i| material_ids[i]);
+    let mut compiler = Compiler {
+        shapes: &shapes,
+        materials: &materials,
+        material_ids: &material_ids,
+        prims: Manifest::default(),
+        slots: HashMap::new(),
+        seen: vec![false; shapes.len()],
+        triangles: 0,
+    };
+    let mut objects = Vec::with_capacity(singles.len());
+    for single in &singles {
+        let Some((shape, PartIds { prim_id, material_ids })) = compiler.part(single, &mut diagnostics)? else {
+            continue;
+        };
+        let instance_id = match single.instance {
+            None => 0,
+            Some(path) => instances.id(path, 1).ok_or_else(|| too_many(path))?,
+        };
+        objects.push(Object { shape, world_from_object: single.transform, prim_id, instance_id, material_ids });
+    }
+    let prototypes = prototypes
+        .iter()
+        .map(|placed| {
+            let (mut parts, mut ids) = (Vec::new(), Vec::new());
+            for part in placed {
+                let Some((shape, part_ids)) = compiler.part(part, &mut diagnostics)? else { continue };
+                parts.push(Part { shape, place_from_object: part.transform });
+                ids.push(part_ids);
+            }
+            Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids)))
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let arrays = arrays.into_iter().filter_map(|array| {
+        let (parts, ids) = &prototypes[array.prototype];
+        let instances =
+            InstanceArray { parts: Arc::clone(parts), places: array.places, world_from_array: array.transform };
+        let parts = Arc::clone(ids);
+        let placed = ObjectArray { instances, parts, first_id: array.first_id, indices: array.indices };
+        (!placed.instances.is_empty()).then_some(placed)
+    });
+    let objects = Objects::new(objects, arrays.collect());
+    let Compiler { prims, seen, triangles, .. } = compiler;
+    let counts = Counts {
+        shapes: seen.iter().filter(|&&s| s).count() as u64,
+        triangles,
+        objects: u64::from(objects.len()),
+        materials: materials.len() as u64,
+    };
+    let skipped = document.skipped.clone();
+    Ok(Scene { objects, materials, prims, instances, skipped, counts, diagnostics, description })
+}
+
+fn too_many(path: &str) -> Error {
+    Error::scene(path, "is one too many: no more than 2^32 prims or instances can be told apart")
+}
+
+/// Gives placed shapes their compiled shape and their identifiers.
+struct Compiler<'a> {
+    shapes: &'a [Option<Compiled>],
+    materials: &'a [Material],
+    /// Identifier of each of the document's materials.
+    material_ids: &'a [u32],
+    prims: Manifest,
+    /// Lists of materials, shared between equal ones.
+    slots: HashMap<Vec<u32>, Arc<[u32]>>,
+    seen: Vec<bool>,
+    triangles: u64,
+}
+
+impl Compiler<'_> {
+    fn part(&mut self, placed: &Placed<'_>, diagnostics: &mut Diagnostics) -> Result<Option<(Arc<Shape>, PartIds)>> {
+        let &Placed { shape, placement, .. } = placed;
+        let prim_id = self.prims.id(&placement.path, 1).ok_or_else(|| too_many(&placement.path))?;
+        let Some((compiled, report)) = &self.shapes[shape] else { return Ok(None) };
+        let material_of = |index: Option<usize>| index.map_or(0, |i| self.material_ids[i]);
         let mut list = vec![material_of(placement.material)];
         list.extend(placement.subset_materials.iter().map(|m| material_of(m.or(placement.material))));
         list.resize(1 + report.subsets, list[0]);
-        if !report.is_closed && list.iter().any(|&id| id > 0 && materials[id as usize - 1].has_interior()) {
+        if !report.is_closed && list.iter().any(|&id| id > 0 && self.materials[id as usize - 1].has_interior()) {
             diagnostics.warn(
                 "open-glass-mesh",
                 &placement.path,
@@ -58,53 +124,11 @@ pub fn build(description: Description) -> Result<Scene> {
                 ),
             );
         }
-        if !std::mem::replace(&mut seen[shape], true) {
-            triangles += report.triangles;
+        if !std::mem::replace(&mut self.seen[shape], true) {
+            self.triangles += report.triangles;
         }
-        let material_ids = slots.entry(list).or_insert_with_key(|list| list.as_slice().into()).clone();
-        objects.push(Object {
-            shape: Arc::clone(compiled),
-            world_from_object: transform,
-            prim_id,
-            instance_id,
-            material_ids,
-        });
-    }
-    let counts = Counts {
-        shapes: seen.iter().filter(|&&s| s).count() as u64,
-        triangles,
-        objects: objects.len() as u64,
-        materials: materials.len() as u64,
-    };
-    let skipped = document.skipped.clone();
-    Ok(Scene {
-        objects,
-        materials,
-        prims: prims.paths,
-        instances: instances.paths,
-        skipped,
-        counts,
-        diagnostics,
-        description,
-    })
-}
-
-/// Paths in the order of first use; ids start at 1.
-#[derive(Default)]
-struct Manifest {
-    paths: Vec<String>,
-    ids: HashMap<String, u32>,
-}
-
-impl Manifest {
-    fn id(&mut self, path: &str) -> u32 {
-        if let Some(&id) = self.ids.get(path) {
-            return id;
-        }
-        self.paths.push(path.to_owned());
-        let id = self.paths.len() as u32;
-        self.ids.insert(path.to_owned(), id);
-        id
+        let material_ids = self.slots.entry(list).or_insert_with_key(|list| list.as_slice().into()).clone();
+        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids })))
     }
 }
 
@@ -120,144 +144,6 @@ fn check_stage(document: &Document) -> Result<()> {
         return Err(Error::scene(&stage.source, format!("upAxis is '{}': it must be Y or Z", stage.up_axis)));
     }
     Ok(())
-}
-
-/// Every index of every group is in range, no group contains itself, and the whole is small enough to unroll.
-fn check_groups(document: &Document) -> Result<()> {
-    let in_range = |index: usize, length: usize, place: &str, what: &str| {
-        if index < length {
-            return Ok(());
-        }
-        Err(Error::scene(
-            place,
-            format!("refers to {what} {index} of {length}: the scene file is damaged, export it again"),
-        ))
-    };
-    in_range(document.root, document.groups.len(), &document.stage.source, "group")?;
-    for group in &document.groups {
-        for item in &group.items {
-            match item.target {
-                Target::Shape(i) => in_range(i, document.shapes.len(), &item.path, "shape")?,
-                Target::Group(i) => in_range(i, document.groups.len(), &item.path, "group")?,
-            }
-            for material in item.material.iter().chain(item.subset_materials.iter().flatten()) {
-                in_range(*material, document.materials.len(), &item.path, "material")?;
-            }
-        }
-    }
-    // Depth first with an explicit stack: a hostile file may nest deeper than the thread's own.
-    #[derive(Clone, Copy)]
-    enum State {
-        New,
-        Open,
-        Counted(u64),
-    }
-    let mut states = vec![State::New; document.groups.len()];
-    let mut stack = vec![(document.root, 0)];
-    states[document.root] = State::Open;
-    while let Some((group, next)) = stack.pop() {
-        let items = &document.groups[group].items;
-        if let Some(item) = items.get(next) {
-            stack.push((group, next + 1));
-            if let Target::Group(child) = item.target {
-                match states[child] {
-                    State::New => {
-                        states[child] = State::Open;
-                        stack.push((child, 0));
-                    }
-                    State::Open => {
-                        return Err(Error::scene(
-                            &item.path,
-                            format!("instances {}, which contains it: break the cycle", document.groups[child].path),
-                        ));
-                    }
-                    State::Counted(_) => {}
-                }
-            }
-        } else {
-            let count = items.iter().fold(0u64, |sum, item| {
-                sum.saturating_add(match item.target {
-                    Target::Shape(_) => 1,
-                    Target::Group(child) => match states[child] {
-                        State::Counted(n) => n,
-                        State::New | State::Open => 0,
-                    },
-                })
-            });
-            if count > MAX_OBJECTS {
-                return Err(Error::scene(
-                    &document.groups[group].path,
-                    format!("its instances unroll to more than {MAX_OBJECTS} objects: load a part of the stage"),
-                ));
-            }
-            states[group] = State::Counted(count);
-        }
-    }
-    Ok(())
-}
-
-struct Placed<'a> {
-    shape: usize,
-    transform: DAffine3,
-    placement: &'a Placement,
-    instance: Option<&'a str>,
-}
-
-/// Unrolls the groups into placed shapes, in the order of the description.
-fn unroll<'a>(document: &'a Document, diagnostics: &mut Diagnostics) -> Result<Vec<Placed<'a>>> {
-    struct Frame<'a> {
-        group: &'a Group,
-        next: usize,
-        transform: DAffine3,
-        instance: Option<&'a str>,
-    }
-    let mut placed = Vec::new();
-    let mut stack =
-        vec![Frame { group: &document.groups[document.root], next: 0, transform: DAffine3::IDENTITY, instance: None }];
-    while let Some(mut frame) = stack.pop() {
-        let Some(item) = frame.group.items.get(frame.next) else { continue };
-        frame.next += 1;
-        let local = item.transform.map_or(Ok(DAffine3::IDENTITY), |m| affine(&m, &item.path))?;
-        let transform = frame.transform * local;
-        let instance = item.instance.as_deref().or(frame.instance);
-        stack.push(frame);
-        match item.target {
-            Target::Group(child) => {
-                stack.push(Frame { group: &document.groups[child], next: 0, transform, instance });
-            }
-            Target::Shape(shape) => {
-                if !is_invertible(&transform) {
-                    diagnostics.warn(
-                        "singular-transform",
-                        &item.path,
-                        "its transform flattens it to nothing: it is left out",
-                    );
-                    continue;
-                }
-                placed.push(Placed { shape, transform, placement: item, instance });
-            }
-        }
-    }
-    Ok(placed)
-}
-
-/// USD's row-vector matrix as an affine map of column vectors.
-fn affine(matrix: &[f64; 16], place: &str) -> Result<DAffine3> {
-    if matrix.iter().any(|v| !v.is_finite()) {
-        return Err(Error::scene(place, "its transform has a value that is not finite"));
-    }
-    if [matrix[3], matrix[7], matrix[11], matrix[15] - 1.0].iter().any(|&v| v != 0.0) {
-        return Err(Error::scene(place, "its transform is projective: only affine transforms place geometry"));
-    }
-    Ok(DAffine3::from_mat4(DMat4::from_cols_array(matrix)))
-}
-
-/// Whether the inverse exists to working precision: the volume is compared with that of the columns' box, so scale is free.
-fn is_invertible(transform: &DAffine3) -> bool {
-    let m = transform.matrix3;
-    let box_volume = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
-    let inverse = transform.inverse();
-    m.determinant().abs() > 1e-14 * box_volume && inverse.is_finite()
 }
 
 type Compiled = (Arc<Shape>, ShapeReport);
@@ -342,7 +228,7 @@ fn build_shape(
             Ok((Some(Arc::new(Shape::Sphere(sphere))), None))
         }
         description::Shape::Mesh(mesh) => {
-            let arrays = MeshArrays { description, mesh };
+            let arrays = NamedArrays { description, place: &mesh.path };
             let hole_indices = mesh.hole_indices.as_deref().map(|name| arrays.integers(name)).transpose()?;
             let counts = arrays.integers(&mesh.face_vertex_counts)?;
             let indices = arrays.integers(&mesh.face_vertex_indices)?;
@@ -369,15 +255,16 @@ fn build_shape(
     }
 }
 
-/// Typed access to the arrays of one mesh.
-struct MeshArrays<'a> {
-    description: &'a Description,
-    mesh: &'a description::Mesh,
+/// Typed access to the arrays of one prim.
+pub(super) struct NamedArrays<'a> {
+    pub(super) description: &'a Description,
+    /// Path of the prim.
+    pub(super) place: &'a str,
 }
 
-impl<'a> MeshArrays<'a> {
+impl<'a> NamedArrays<'a> {
     fn get(&self, name: &str, element: Element, columns: usize) -> Result<&'a Array> {
-        let place = &self.mesh.path;
+        let place = self.place;
         let array = self
             .description
             .arrays
@@ -403,18 +290,29 @@ impl<'a> MeshArrays<'a> {
 
     /// Shares the memory of a float array.
     fn buffer<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
-        let array = self.get(name, Element::F32, columns)?;
+        self.share(name, Element::F32, columns)
+    }
+
+    /// Shares the memory of an array of doubles.
+    pub(super) fn doubles<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
+        self.share(name, Element::F64, columns)
+    }
+
+    /// Shares the memory of an array of integers.
+    pub(super) fn indices(&self, name: &str) -> Result<Buffer<i32>> {
+        self.share(name, Element::I32, 1)
+    }
+
+    fn share<T: bytemuck::Pod>(&self, name: &str, element: Element, columns: usize) -> Result<Buffer<T>> {
+        let array = self.get(name, element, columns)?;
         Buffer::new(array.bytes.clone())
-            .map_err(|problem| Error::scene(&self.mesh.path, format!("array '{name}': {problem}")))
+            .map_err(|problem| Error::scene(self.place, format!("array '{name}': {problem}")))
     }
 
     fn integers(&self, name: &str) -> Result<&'a [i32]> {
         let array = self.get(name, Element::I32, 1)?;
         bytemuck::try_cast_slice(&array.bytes).map_err(|_| {
-            Error::scene(
-                &self.mesh.path,
-                format!("array '{name}' is not aligned to its elements: write the file again"),
-            )
+            Error::scene(self.place, format!("array '{name}' is not aligned to its elements: write the file again"))
         })
     }
 
@@ -424,7 +322,7 @@ impl<'a> MeshArrays<'a> {
             indices: primvar.indices.as_deref().map(|name| self.integers(name)).transpose()?,
             interpolation: Interpolation::from_token(&primvar.interpolation).ok_or_else(|| {
                 Error::scene(
-                    &self.mesh.path,
+                    self.place,
                     format!("unknown interpolation '{}': use vertex or faceVarying", primvar.interpolation),
                 )
             })?,
@@ -433,9 +331,9 @@ impl<'a> MeshArrays<'a> {
 }
 
 /// Compiles the materials that something placed uses; returns them with the id of each of the document's materials.
-fn build_materials(
+fn build_materials<'a>(
     document: &Document,
-    placed: &[Placed<'_>],
+    placed: impl Iterator<Item = &'a Placed<'a>>,
     diagnostics: &mut Diagnostics,
 ) -> Result<(Vec<Material>, Vec<u32>)> {
     let mut used = vec![false; document.materials.len()];

@@ -266,6 +266,30 @@ pub struct Group {
     pub path: String,
     /// What stands in it.
     pub items: Vec<Placement>,
+    /// What stands in it many times.
+    #[serde(default)]
+    pub instances: Vec<Instances>,
+}
+
+/// A group placed by an array of transforms: those elements of a point instancer that show one prototype.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Instances {
+    /// Prim path of the instancer; the `instance_id` is that of `path[index]`.
+    pub path: String,
+    /// The prototype: index into [`Document::groups`].
+    pub group: usize,
+    /// The surrounding group's space from the instancer's; identity if absent.
+    #[serde(default)]
+    pub transform: Option<[f64; 16]>,
+    /// Array f64 `[n, 12]`: the instancer's space from the prototype's. Rows of matrices without their last column, which is
+    /// (0, 0, 0, 1): translation last.
+    pub transforms: String,
+    /// Array i32 `[n]`: which element of the instancer each is, increasing; 0, 1, 2 … if absent.
+    #[serde(default)]
+    pub indices: Option<String>,
+    /// Elements of the instancer, hidden ones and those of other prototypes included.
+    pub count: usize,
 }
 
 /// A shape or a group, placed.

@@ -6,47 +6,33 @@
 pub mod builder;
 pub mod description;
 pub mod file;
+mod manifest;
 pub mod material;
+mod objects;
 mod solids;
+mod unroll;
 pub mod view;
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
-
-use glam::DAffine3;
 
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
-use crate::geometry::Shape;
 use description::{Description, Document};
+pub use manifest::Manifest;
 use material::Material;
-
-/// A placed shape.
-#[derive(Clone, Debug)]
-pub struct Object {
-    /// The shape, shared between its placements.
-    pub shape: Arc<Shape>,
-    /// Stage world from object space.
-    pub world_from_object: DAffine3,
-    /// `prim_id`: 1-based index into [`Scene::prims`].
-    pub prim_id: u32,
-    /// `instance_id`: 1-based index into [`Scene::instances`], 0 for none.
-    pub instance_id: u32,
-    /// Material per slot (slot 0: faces in no subset): `material_id`, 1-based index into [`Scene::materials`], 0 for none.
-    pub material_ids: Arc<[u32]>,
-}
+pub use objects::{Object, ObjectArray, ObjectIds, Objects, PartIds};
 
 /// Everything that can be rendered, checked.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Placed shapes in the order of the description: the index is the tie-breaker between coincident surfaces.
-    pub objects: Vec<Object>,
+    /// Placed shapes in the order of the description.
+    pub objects: Objects,
     /// Materials bound to some object, in the order of the description.
     pub materials: Vec<Material>,
     /// Prim paths behind `prim_id`.
-    pub prims: Vec<String>,
+    pub prims: Manifest,
     /// Instance paths behind `instance_id`.
-    pub instances: Vec<String>,
+    pub instances: Manifest,
     /// What was left out, and how often.
     pub skipped: BTreeMap<String, u64>,
     /// Counts for the statistics: triangles stored, shapes, bytes.

@@ -1,17 +1,38 @@
 //! The scene as one camera sees it: instances about the camera, media at one wavelength, the media it stands in.
 
+use std::sync::atomic::{AtomicU8, Ordering};
+
 use glam::DVec3;
 
 use super::Scene;
 use super::material::{Kind, Material};
 use crate::error::{Error, Result};
-use crate::geometry::{Aggregate, Departures, Hit, Instance, Ray};
+use crate::geometry::{Aggregate, Departures, Hit, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
 use crate::spectrum::Wavelength;
 
 /// The direction of the one fixed ray that finds the media around the camera: no axis or diagonal that scenes are built on.
 const PARITY_DIRECTION: DVec3 = DVec3::new(0.267_261_241_912_424_4, 0.534_522_483_824_848_8, 0.801_783_725_737_273_2);
+
+/// Whether something is so, found out when a ray first asks. Several threads may find out at once: the answer is the same.
+#[derive(Debug, Default)]
+struct FoundOut(AtomicU8);
+
+impl FoundOut {
+    const UNKNOWN: u8 = 0;
+    const NO: u8 = 1;
+    const YES: u8 = 2;
+
+    fn or_find(&self, find: impl FnOnce() -> bool) -> bool {
+        let mut answer = self.0.load(Ordering::Relaxed);
+        if answer == Self::UNKNOWN {
+            answer = if find() { Self::YES } else { Self::NO };
+            self.0.store(answer, Ordering::Relaxed);
+        }
+        answer == Self::YES
+    }
+}
 
 /// A scene in render space: the stage's world with the camera at the origin.
 #[derive(Debug)]
@@ -23,41 +44,38 @@ pub struct View<'a> {
     /// World position of the origin.
     pub origin: DVec3,
     /// Per object: whether its glass can coincide with that of another.
-    touching: Vec<bool>,
+    touching: Vec<FoundOut>,
     /// Per object: whether it can coincide with any other.
-    in_contact: Vec<bool>,
+    in_contact: Vec<FoundOut>,
 }
 
 impl<'a> View<'a> {
     /// `scene` about the world point `origin`.
     pub fn new(scene: &'a Scene, origin: DVec3) -> Self {
-        let instances: Vec<_> = scene
-            .objects
-            .iter()
-            .map(|object| Instance { shape: object.shape.clone(), world_from_object: object.world_from_object })
-            .collect();
-        let aggregate = Aggregate::build(&instances, origin);
-        let touching = aggregate.touching(|object| {
-            let ids = &scene.objects[object as usize].material_ids;
-            ids.iter().any(|id| id.checked_sub(1).is_some_and(|i| scene.materials[i as usize].has_interior()))
-        });
-        let in_contact = aggregate.touching(|_| true);
-        Self { scene, aggregate, origin, touching, in_contact }
+        let (singles, arrays) = scene.objects.instances();
+        let aggregate = Aggregate::with_arrays(&singles, arrays, origin);
+        let unknown = || (0..scene.objects.len()).map(|_| FoundOut::default()).collect();
+        Self { scene, aggregate, origin, touching: unknown(), in_contact: unknown() }
     }
 
     /// Whether the surface at `hit` can coincide with another object's glass (cemented lenses, liquid in its glass).
     pub fn is_touching(&self, hit: &Hit) -> bool {
-        self.touching[hit.instance as usize]
+        self.touching[hit.instance as usize].or_find(|| {
+            let has_interior =
+                |id: &u32| id.checked_sub(1).is_some_and(|i| self.scene.materials[i as usize].has_interior());
+            let is_glass = |object| self.scene.objects.ids(object).material_ids.iter().any(has_interior);
+            is_glass(hit.instance) && self.aggregate.is_touching(hit.instance, is_glass)
+        })
     }
 
     /// Whether the surface at `hit` can coincide with any other object (glass on a table, the silver behind a mirror).
     pub fn is_in_contact(&self, hit: &Hit) -> bool {
-        self.in_contact[hit.instance as usize]
+        self.in_contact[hit.instance as usize].or_find(|| self.aggregate.is_touching(hit.instance, |_| true))
     }
 
     /// `material_id` at `hit`, 0 for none.
     pub fn material_id(&self, hit: &Hit) -> u32 {
-        let ids = &self.scene.objects[hit.instance as usize].material_ids;
+        let ids = self.scene.objects.ids(hit.instance).material_ids;
         ids[self.slot(hit, ids) as usize]
     }
 

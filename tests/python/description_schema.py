@@ -153,6 +153,24 @@ def _check_arrays(document, arrays):
                 assert primvar["interpolation"] in ("constant", "uniform", "varying", "vertex", "faceVarying")
         for subset in mesh.get("subsets", []):
             array(subset["faces"], np.int32, 1, where)
+    shared = set()
+    for index, group in enumerate(document["groups"]):
+        for instances in group.get("instances", []):
+            where = f"groups[{index}]"
+            name = instances["transforms"]
+            # Native instances share an instancer's arrays.
+            if name in shared:
+                continue
+            shared.add(name)
+            array(name, np.float64, 12, where)
+            places = len(arrays[name])
+            if instances.get("indices") is None:
+                assert places == instances["count"], f"{where}: {places} transforms of {instances['count']} elements"
+                continue
+            array(instances["indices"], np.int32, 1, where)
+            indices = arrays[instances["indices"]]
+            assert len(indices) == places, f"{where}: {len(indices)} indices of {places} transforms"
+            assert (np.diff(indices) > 0).all() and indices[0] >= 0 and indices[-1] < instances["count"], where
     return used
 
 
@@ -164,6 +182,8 @@ def _check_references(document):
             assert index < len(document["shapes" if kind == "shape" else "groups"])
             for material in [item.get("material"), *item.get("subset_materials", [])]:
                 assert material is None or material < len(document["materials"])
+        for instances in group.get("instances", []):
+            assert instances["group"] < len(document["groups"])
     assert document["cameras"], "there is always a camera"
     settings = document["settings"]
     for product in [*settings.get("products", []), *filter(None, [settings.get("base")])]:

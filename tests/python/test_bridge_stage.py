@@ -184,7 +184,8 @@ def test_what_is_left_out_is_counted_or_named():
         "lights: not asked for": 2,
     }
     named = {warning["message"].split()[0]: warning for warning in warned(description, "unsupported-prim")}
-    assert set(named) == {"BasisCurves", "PointInstancer"}
+    assert set(named) == {"BasisCurves"}
+    assert warned(description, "instancer")[0]["places"] == ["</Scatter>.protoIndices"]
     assert warned(description, "unknown-prim-type")[0]["places"] == ["</Unknown>"]
 
 

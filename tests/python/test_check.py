@@ -73,7 +73,7 @@ def put_all(value, *names):
         (put_all(0.1, "normal.X", "normal.Y", "normal.Z"), "normal.X", (20, 12), "length 1"),
         (put("interfaces.I", 65), "interfaces.I", (20, 12), "64"),
         (put("total_reflections.I", 3), "total_reflections.I", (20, 12), "number of interfaces"),
-        (put("prim_id.I", 3), "prim_id.I", (20, 12), "2 entries"),
+        (put("prim_id.I", 3), "prim_id.I", (20, 12), "2 paths"),
     ],
 )
 def test_values_that_cannot_be_are_found_at_their_pixel(tmp_path, change, channel, pixel, words):

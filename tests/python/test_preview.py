@@ -65,7 +65,7 @@ def test_only_the_layers_asked_for_are_shown(tmp_path):
     tiles, title = preview.tiles_of(film(), layers=["prim_id", "dispersion"], aovs=UNITS)
     assert [tile.name for tile in tiles] == ["prim_id", "dispersion"]
     assert tiles[1].unit == "pixel/nm"
-    assert tiles[0].names == ("/World/Ball", "/World/Floor")
+    assert list(tiles[0].names) == ["/World/Ball", "/World/Floor"]
     assert "ball.usda" in title
     with pytest.raises(UsageError, match=r"dispersoin.*dispersion"):
         write_preview(film(), tmp_path / "sheet.png", layers=["dispersoin"], aovs=UNITS)

@@ -43,7 +43,7 @@ impl Stagehand {
                 frames_per_second: Some(24.0),
             },
             shapes: vec![],
-            groups: vec![Group { path: "/".into(), items: vec![] }],
+            groups: vec![Group { path: "/".into(), items: vec![], instances: vec![] }],
             root: 0,
             materials: vec![],
             cameras: vec![],

@@ -21,6 +21,7 @@ def add(commands: Any) -> None:
         "--render-settings", "--renderSettingsPrimPath", "-rs", metavar="P", help="path of a RenderSettings prim"
     )
     group.add_argument("--product", metavar="P", help="path of the one RenderProduct to keep")
+    options.add_scalar_ior(group)
     group.add_argument("--strict", action="store_true", help="a stage without a camera is an error")
     options.add_quiet(parser)
     parser.set_defaults(run=run)

@@ -11,7 +11,16 @@ from .._api import Options, Scene
 from ..errors import NotUsdError, UsageError
 from . import messages
 
-__all__ = ["add_quiet", "add_request", "add_stage", "numbers", "open_scene", "request", "stage_options"]
+__all__ = [
+    "add_quiet",
+    "add_request",
+    "add_scalar_ior",
+    "add_stage",
+    "numbers",
+    "open_scene",
+    "request",
+    "stage_options",
+]
 
 SCENE_SUFFIX = ".safetensors"
 _SCENE_FILE = f"an exported {SCENE_SUFFIX} scene"
@@ -103,10 +112,33 @@ def add_stage(parser: argparse.ArgumentParser, time: bool = True, scene_file: bo
         help="where to look for assets after the stage's own folders",
     )
     group.add_argument(
+        "--session-layer", "--sessionLayer", metavar="FILE", help="a layer stronger than all layers of the stage"
+    )
+    group.add_argument(
+        "--mask",
+        type=_names,
+        action="extend",
+        default=[],
+        metavar="PRIM[,PRIM...]",
+        help="load these prims and what they need, nothing else",
+    )
+    group.add_argument(
+        "--payloads", choices=("all", "none"), default="all", help="which payloads to load; all unless given"
+    )
+    group.add_argument(
         "--missing",
         choices=("warn", "error"),
         default="warn",
         help="what a missing layer or reference is; warn unless given",
+    )
+
+
+def add_scalar_ior(group: argparse._ArgumentGroup) -> None:
+    """Add ``--scalar-ior``, which an exported scene keeps."""
+    group.add_argument(
+        "--scalar-ior",
+        choices=("constant", "nearest-glass"),
+        help="what becomes of an index without dispersion; constant",
     )
 
 
@@ -137,11 +169,7 @@ def add_request(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--dispersion-scale", type=float, metavar="S", help="multiplies all dispersion: 0 none, 1 physical"
     )
-    group.add_argument(
-        "--scalar-ior",
-        choices=("constant", "nearest-glass"),
-        help="what becomes of an index without dispersion; constant",
-    )
+    add_scalar_ior(group)
     group.add_argument("--seed", type=int, metavar="N", help="same seed, same bits")
     group.add_argument(
         "--threads", type=int, metavar="N", help="all of the machine's unless given; never changes a bit"
@@ -195,6 +223,9 @@ def stage_options(args: argparse.Namespace) -> dict[str, Any]:
         "variants": args.variant,
         "overrides": args.overrides,
         "search_paths": args.search_path,
+        "session_layer": args.session_layer,
+        "mask": args.mask,
+        "payloads": args.payloads,
         "frame": frame(args),
     }
 
@@ -224,6 +255,9 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
                 variants=args.variant,
                 overrides=args.overrides,
                 search_paths=args.search_path,
+                session_layer=args.session_layer,
+                mask=args.mask,
+                payloads=args.payloads,
                 missing=args.missing,
                 scalar_ior=args.scalar_ior,
                 strict=args.strict,
@@ -237,6 +271,9 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
         "--variant": bool(args.variant),
         "--set": bool(args.overrides),
         "--search-path": bool(args.search_path),
+        "--session-layer": args.session_layer is not None,
+        "--mask": bool(args.mask),
+        "--payloads": args.payloads != "all",
         "--scalar-ior": args.scalar_ior is not None,
     }
     for option, is_given in given.items():

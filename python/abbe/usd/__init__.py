@@ -29,6 +29,9 @@ def describe(
     variants: Sequence[str] = (),
     overrides: Mapping[str, Any] | Sequence[str] = (),
     search_paths: Sequence[str | os.PathLike[str]] = (),
+    session_layer: str | os.PathLike[str] | None = None,
+    mask: Sequence[str] = (),
+    payloads: str = "all",
     missing: str = "warn",
     scalar_ior: str | None = None,
     strict: bool = False,
@@ -46,6 +49,9 @@ def describe(
     variants : selections such as ``"/World/Ball{material=glass}"``
     overrides : values such as ``"/World/Glass.inputs:ior=1.6"``, as text or as a mapping to Python values
     search_paths : folders in which relative asset paths are looked up after the stage's own
+    session_layer : a layer stronger than all of the stage, which is not changed
+    mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
+    payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
     missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
     scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
     strict : a stage without a camera is an error
@@ -78,6 +84,9 @@ def describe(
         variants=variants,
         overrides=overrides,
         search_paths=search_paths,
+        session_layer=session_layer,
+        mask=mask,
+        payloads=payloads,
         missing=missing,
         strict=strict,
     )
@@ -93,12 +102,15 @@ def list_cameras(
     variants: Sequence[str] = (),
     overrides: Mapping[str, Any] | Sequence[str] = (),
     search_paths: Sequence[str | os.PathLike[str]] = (),
+    session_layer: str | os.PathLike[str] | None = None,
+    mask: Sequence[str] = (),
+    payloads: str = "all",
 ) -> list[CameraInfo]:
     """List the cameras of a stage in the order of traversal.
 
     Parameters
     ----------
-    stage_or_path, frame, variants, overrides, search_paths : as for :func:`describe`
+    stage_or_path, frame, variants, overrides, search_paths, session_layer, mask, payloads : as for :func:`describe`
 
     Returns
     -------
@@ -107,7 +119,16 @@ def list_cameras(
     """
     from .listing import cameras
 
-    return cameras(stage_or_path, frame=frame, variants=variants, overrides=overrides, search_paths=search_paths)
+    return cameras(
+        stage_or_path,
+        frame=frame,
+        variants=variants,
+        overrides=overrides,
+        search_paths=search_paths,
+        session_layer=session_layer,
+        mask=mask,
+        payloads=payloads,
+    )
 
 
 def list_settings(
@@ -117,12 +138,15 @@ def list_settings(
     variants: Sequence[str] = (),
     overrides: Mapping[str, Any] | Sequence[str] = (),
     search_paths: Sequence[str | os.PathLike[str]] = (),
+    session_layer: str | os.PathLike[str] | None = None,
+    mask: Sequence[str] = (),
+    payloads: str = "all",
 ) -> list[SettingsInfo]:
     """List the render settings of a stage with their products and variables.
 
     Parameters
     ----------
-    stage_or_path, frame, variants, overrides, search_paths : as for :func:`describe`
+    stage_or_path, frame, variants, overrides, search_paths, session_layer, mask, payloads : as for :func:`describe`
 
     Returns
     -------
@@ -131,4 +155,13 @@ def list_settings(
     """
     from .listing import settings
 
-    return settings(stage_or_path, frame=frame, variants=variants, overrides=overrides, search_paths=search_paths)
+    return settings(
+        stage_or_path,
+        frame=frame,
+        variants=variants,
+        overrides=overrides,
+        search_paths=search_paths,
+        session_layer=session_layer,
+        mask=mask,
+        payloads=payloads,
+    )

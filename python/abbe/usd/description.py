@@ -12,7 +12,7 @@ import numpy.typing as npt
 __all__ = ["Array", "ArrayTable", "Description", "Diagnostics"]
 
 Array = npt.NDArray[Any]
-"""A float32 or int32 array of shape (n,) or (n, k); usually USD's own memory, read-only."""
+"""A float32, float64 or int32 array of shape (n,) or (n, k); usually USD's own memory, read-only."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class Diagnostics:
         if len(warning["places"]) < self.EXAMPLES and place not in warning["places"]:
             warning["places"].append(place)
 
-    def skip(self, reason: str) -> None:
-        """Count one prim left out for ``reason``."""
-        self.skipped[reason] = self.skipped.get(reason, 0) + 1
+    def skip(self, reason: str, count: int = 1) -> None:
+        """Count prims or instances left out for ``reason``."""
+        self.skipped[reason] = self.skipped.get(reason, 0) + count
 
     def warnings(self) -> list[dict[str, Any]]:
         """Return all warnings in the order of first occurrence."""
@@ -73,6 +73,6 @@ class ArrayTable:
     def add(self, name: str, array: Array) -> str:
         """Store ``array`` and return its name."""
         assert name not in self.arrays, f"array {name} is stored twice"
-        assert array.dtype in (np.float32, np.int32), f"array {name} is {array.dtype}"
+        assert array.dtype in (np.float32, np.float64, np.int32), f"array {name} is {array.dtype}"
         self.arrays[name] = array
         return name

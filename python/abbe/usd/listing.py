@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Unpack
 
 from . import tokens
 from ._pxr import UsdGeom
@@ -13,7 +11,7 @@ from .cameras import all_cameras, read_camera
 from .description import Diagnostics
 from .reader import default_camera
 from .render import all_settings, find_settings, read_settings, token_list
-from .stage import OpenedStage, Overrides, open_stage, quiet_usd, source_name, stage_time
+from .stage import Opening, open_stage, quiet_usd, source_name, stage_time
 
 __all__ = ["CameraInfo", "ProductInfo", "SettingsInfo", "VarInfo", "cameras", "settings"]
 
@@ -68,30 +66,11 @@ class SettingsInfo:
     products: tuple[ProductInfo, ...]
 
 
-def _open(
-    stage_or_path: Any,
-    variants: Sequence[str],
-    overrides: Overrides,
-    search_paths: Sequence[str | os.PathLike[str]],
-    diagnostics: Diagnostics,
-) -> OpenedStage:
-    return open_stage(
-        stage_or_path, variants=variants, overrides=overrides, search_paths=search_paths, diagnostics=diagnostics
-    )
-
-
-def cameras(
-    stage_or_path: Any,
-    *,
-    frame: float | str | None,
-    variants: Sequence[str],
-    overrides: Overrides,
-    search_paths: Sequence[str | os.PathLike[str]],
-) -> list[CameraInfo]:
+def cameras(stage_or_path: Any, *, frame: float | str | None, **opening: Unpack[Opening]) -> list[CameraInfo]:
     """Return the cameras of a stage; see :func:`abbe.usd.list_cameras`."""
     diagnostics = Diagnostics()
     with quiet_usd(source_name(stage_or_path), diagnostics):
-        opened = _open(stage_or_path, variants, overrides, search_paths, diagnostics)
+        opened = open_stage(stage_or_path, diagnostics=diagnostics, **opening)
         time, _ = stage_time(opened.stage, frame)
         prims = all_cameras(opened.stage)
         default = default_camera(opened.stage, find_settings(opened.stage, None, opened.source), prims)
@@ -104,18 +83,11 @@ def _camera_info(camera: dict[str, Any], is_default: bool) -> CameraInfo:
     return CameraInfo(**{name: camera[name] for name in names}, is_default=is_default)
 
 
-def settings(
-    stage_or_path: Any,
-    *,
-    frame: float | str | None,
-    variants: Sequence[str],
-    overrides: Overrides,
-    search_paths: Sequence[str | os.PathLike[str]],
-) -> list[SettingsInfo]:
+def settings(stage_or_path: Any, *, frame: float | str | None, **opening: Unpack[Opening]) -> list[SettingsInfo]:
     """Return the render settings of a stage; see :func:`abbe.usd.list_settings`."""
     diagnostics = Diagnostics()
     with quiet_usd(source_name(stage_or_path), diagnostics):
-        opened = _open(stage_or_path, variants, overrides, search_paths, diagnostics)
+        opened = open_stage(stage_or_path, diagnostics=diagnostics, **opening)
         stage, source = opened.stage, opened.source
         time, time_code = stage_time(stage, frame)
         default = find_settings(stage, None, source)

@@ -8,25 +8,26 @@ from __future__ import annotations
 
 import enum
 import itertools
-import os
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
 from ..errors import StageError, UsageError
 from . import tokens
-from ._pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+from ._pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 from .cameras import find_camera, framed_camera, read_camera
-from .description import Description, Diagnostics
+from .description import Array, ArrayTable, Description, Diagnostics
 from .geometry import ShapeReader
+from .instancers import InstancerReader
 from .lenses import is_lens
 from .materials import MaterialReader
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import (
     OpenedStage,
-    Overrides,
+    Opening,
     composition_warnings,
     open_stage,
     quiet_usd,
@@ -115,6 +116,21 @@ class _Placed(NamedTuple):
     item: dict[str, Any]
 
 
+@dataclass
+class _Group:
+    """What is placed together: the stage, or a prototype of point instancers."""
+
+    path: str
+    root: Any = None
+    """The prototype's root prim, whose own transform is that of the instances; None for the stage."""
+    placed: list[_Placed] = field(default_factory=list)
+    instances: list[dict[str, Any]] = field(default_factory=list)
+
+
+# Deeper nesting of instancers than this nobody models, and Python's own stack would end soon after.
+_MAX_NESTING = 64
+
+
 class _Walk:
     """One reading of one stage at one time."""
 
@@ -125,28 +141,39 @@ class _Walk:
         self.diagnostics = diagnostics
         self.transforms = UsdGeom.XformCache(time)
         self.shapes = ShapeReader(time, diagnostics)
-        self.placed: list[_Placed] = []
+        self._table = ArrayTable()
+        self.instancers = InstancerReader(time, diagnostics, self._table)
+        self.groups: list[_Group] = [_Group("/")]
         self.cameras: list[Any] = []
         self._kinds: dict[str, _Kind] = {}
         self._facts_by_prim: dict[Any, _Facts] = {}
+        self._group_by_prototype: dict[tuple[Any, str | None], int] = {}
+        # The prototypes around what is visited, innermost last.
+        self._open: list[Any] = []
 
     def run(self) -> None:
         """Visit every prim that the stage defines, those inside native instances included."""
-        states = [_State(True, None, None)]
         prims = iter(Usd.PrimRange(self.stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
-        for prim in itertools.islice(prims, 1, None):
+        self._traverse(prims, itertools.islice(prims, 1, None), _State(True, None, None), 0, self.groups[0])
+
+    def _traverse(self, prims: Any, visited: Any, state: _State, depth: int, group: _Group) -> None:
+        """Visit the prims of a range; ``depth`` is that of the first one's parent, ``state`` what it inherits."""
+        states = [state]
+        for prim in visited:
             path = prim.GetPath()
-            del states[path.pathElementCount :]
+            del states[path.pathElementCount - depth :]
             parent = states[-1]
             # Below an instance all is shared; the instance itself may differ from its prototype's root.
-            source = prim.GetPrimInPrototype() if parent.instance is not None else None
+            source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else None
             facts = self._facts_by_prim.get(source) if source else None
             if facts is None:
                 facts = self._facts(prim)
                 if source:
                     self._facts_by_prim[source] = facts
             kind = facts.kind
-            if kind is _Kind.LEAF:
+            # In a prototype, what stands above may be an `over`, but what is drawn is defined.
+            undefined = group.root is not None and prim.GetSpecifier() == Sdf.SpecifierOver
+            if kind is _Kind.LEAF or undefined:
                 prims.PruneChildren()
                 continue
             state = self._inherit(prim, facts, parent)
@@ -157,10 +184,85 @@ class _Walk:
             if kind is _Kind.INSTANCER:
                 # Its prototypes usually stand below it and are not drawn where they stand.
                 prims.PruneChildren()
-            if kind is not _Kind.PASS_THROUGH:
-                self._visit(prim, source or prim, str(path), kind, state)
+                self._instance(prim, source or prim, str(path), state, group)
+            elif kind is not _Kind.PASS_THROUGH:
+                self._visit(prim, source or prim, str(path), kind, state, group)
             elif prim.IsModel():
                 self._check_draw_mode(prim, state)
+
+    def _instance(self, prim: Any, source: Any, path: str, state: _State, group: _Group) -> None:
+        """Add what a point instancer shows to ``group``."""
+        if not state.visible:
+            self.diagnostics.skip("invisible")
+            return
+
+        def has_something(root: Any) -> bool:
+            index = self._prototype(root, prim, state)
+            return index is not None and bool(self.groups[index].placed or self.groups[index].instances)
+
+        transform = self._transform(prim, group)
+        for elements in self.instancers.elements(prim, source, has_something):
+            item: dict[str, Any] = {
+                "path": path,
+                "group": self._prototype(self.stage.GetPrimAtPath(elements.prototype), prim, state),
+                "transforms": elements.transforms,
+                "count": elements.total,
+            }
+            if elements.indices is not None:
+                item["indices"] = elements.indices
+            if transform != IDENTITY:
+                item["transform"] = transform
+            group.instances.append(item)
+
+    def _prototype(self, root: Any, instancer: Any, state: _State) -> int | None:
+        """Return the group of a prototype; None with a warning where it contains the instancer.
+
+        As in Hydra, a prototype's visibility is decided from its root down and by the instancer: what hides it where it
+        stands does not hide its instances. Purpose is inherited where it stands, else from the instancer.
+        """
+        purpose = self._purpose_above(root) or state.purpose
+        key = (root, purpose)
+        if root in self._open:
+            self.diagnostics.warn(
+                "instancer", place(instancer), f"its prototype <{root.GetPath()}> contains it; it is left out there"
+            )
+            return None
+        index = self._group_by_prototype.get(key)
+        if index is None:
+            if len(self._open) == _MAX_NESTING:
+                raise StageError(
+                    f"{place(instancer)}: is nested in {_MAX_NESTING} others: instance what they come to, or bake it"
+                )
+            index = self._group_by_prototype[key] = len(self.groups)
+            group = _Group(str(root.GetPath()), root)
+            self.groups.append(group)
+            self._open.append(root)
+            prims = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
+            depth = root.GetPath().pathElementCount - 1
+            self._traverse(prims, prims, _State(True, purpose, None), depth, group)
+            self._open.pop()
+        return index
+
+    def _purpose_above(self, prim: Any) -> str | None:
+        """Return the purpose that a prim inherits where it stands; None where none is authored."""
+        ancestor = prim.GetParent()
+        while ancestor and not ancestor.IsPseudoRoot():
+            purpose = self._facts(ancestor).purpose
+            if purpose is not None:
+                return purpose
+            ancestor = ancestor.GetParent()
+        return None
+
+    def _transform(self, prim: Any, group: _Group) -> list[float]:
+        """Return the matrix from a prim's space to its group's: the world's, or the prototype root's own."""
+        if group.root is None:
+            transform = matrix(self.transforms.GetLocalToWorldTransform(prim))
+        else:
+            relative, _ = self.transforms.ComputeRelativeTransform(prim, group.root)
+            transform = matrix(relative)
+        if not is_finite(transform):
+            raise StageError(f"{place(prim)}: its transform is not finite: correct its xformOps or its parents'")
+        return transform
 
     def _facts(self, prim: Any) -> _Facts:
         type_name = prim.GetTypeName()
@@ -188,10 +290,11 @@ class _Walk:
             str(prim.GetPath()) if enters_instance else parent.instance,
         )
 
-    def _visit(self, prim: Any, source: Any, path: str, kind: _Kind, state: _State) -> None:
+    def _visit(self, prim: Any, source: Any, path: str, kind: _Kind, state: _State, group: _Group) -> None:
         """Do with a prim what its kind asks for; ``source`` is what it shares with other instances, or itself."""
         if kind is _Kind.CAMERA:
-            self.cameras.append(prim)
+            if group.root is None:
+                self.cameras.append(prim)
             return
         if kind is _Kind.LIGHT:
             self.diagnostics.skip("lights: not asked for")
@@ -204,13 +307,13 @@ class _Walk:
             self.diagnostics.skip(f"purpose {purpose}")
             return
         if kind is _Kind.MESH:
-            self._place(prim, path, self.shapes.mesh(prim, source), state)
+            self._place(prim, path, self.shapes.mesh(prim, source), state, group)
         elif kind is _Kind.SPHERE:
-            self._place(prim, path, self.shapes.sphere(prim, source), state)
+            self._place(prim, path, self.shapes.sphere(prim, source), state, group)
         elif kind is _Kind.LENS:
-            self._place(prim, path, self.shapes.lens(prim, source), state)
+            self._place(prim, path, self.shapes.lens(prim, source), state, group)
         elif kind is _Kind.SOLID:
-            self._place(prim, path, self.shapes.solid(prim, source), state)
+            self._place(prim, path, self.shapes.solid(prim, source), state, group)
         elif kind is _Kind.SKELETAL:
             self.diagnostics.warn(
                 "unsupported-prim", place(prim), "skinning is not supported; meshes below are rendered as authored"
@@ -235,52 +338,82 @@ class _Walk:
                 f"draw mode '{mode}' is not supported; all of it is rendered",
             )
 
-    def _place(self, prim: Any, path: str, shape: int | None, state: _State) -> None:
+    def _place(self, prim: Any, path: str, shape: int | None, state: _State, group: _Group) -> None:
         if shape is None:
             return
         item: dict[str, Any] = {"path": path, "target": {"shape": shape}}
-        transform = matrix(self.transforms.GetLocalToWorldTransform(prim))
-        if not is_finite(transform):
-            raise StageError(f"{place(prim)}: its transform is not finite: correct its xformOps or its parents'")
+        transform = self._transform(prim, group)
         if transform != IDENTITY:
             item["transform"] = transform
-        if state.instance is not None:
+        # The instances of a point instancer have names of their own.
+        if state.instance is not None and group.root is None:
             item["instance"] = state.instance
         if self.shapes.double_sided[shape]:
             item["double_sided"] = True
-        self.placed.append(_Placed(prim, shape, item))
+        group.placed.append(_Placed(prim, shape, item))
 
     def bind(self, materials: MaterialReader) -> list[dict[str, Any]]:
-        """Add materials to the placements and return them."""
+        """Add materials to the placements and return the groups."""
+        placements = [placed for group in self.groups for placed in group.placed]
         prims: list[Any] = []
-        for placed in self.placed:
+        for placed in placements:
             prims.append(placed.prim)
             prims.extend(placed.prim.GetChild(name) for name in self.shapes.subset_names[placed.shape])
         bound = iter(materials.bound(prims))
-        for placed in self.placed:
+        for placed in placements:
             material = next(bound)
             if material is not None:
                 placed.item["material"] = material
             names = self.shapes.subset_names[placed.shape]
             if names:
                 placed.item["subset_materials"] = [next(bound) for _ in names]
-        return [placed.item for placed in self.placed]
+        groups: list[dict[str, Any]] = []
+        for group in self.groups:
+            groups.append({"path": group.path, "items": [placed.item for placed in group.placed]})
+            if group.instances:
+                groups[-1]["instances"] = group.instances
+        return groups
+
+    def arrays(self) -> dict[str, Array]:
+        """Return all arrays by name."""
+        return {**self.shapes.arrays, **self._table.arrays}
 
     def bounds(self) -> tuple[list[float], list[float]] | None:
         """Return the world box of everything placed, by the corners of object-space boxes; None if there is none."""
         corners: dict[int, Any] = {}
-        for shape in {placed.shape for placed in self.placed}:
+        for shape in {placed.shape for group in self.groups for placed in group.placed}:
             extent = self.shapes.bounds(shape)
             if extent is not None:
                 # Homogeneous rows, as USD multiplies them.
                 corners[shape] = np.array([(*corner, 1.0) for corner in itertools.product(*zip(*extent, strict=True))])
-        placed = [p for p in self.placed if p.shape in corners]
-        if not placed:
-            return None
-        matrices = np.array([p.item.get("transform", IDENTITY) for p in placed]).reshape(-1, 4, 4)
+        box = self._box(0, corners, {})
+        return None if box is None else _finite_box(box[0].tolist(), box[1].tolist())
+
+    def _box(self, index: int, corners: dict[int, Any], boxes: dict[int, Any]) -> Any:
+        """Return the box of a group in its own space from the corners of shapes; ``boxes`` keeps what is known."""
+        if index in boxes:
+            return boxes[index]
+        found: list[Any] = []
+        group = self.groups[index]
+        placed = [p for p in group.placed if p.shape in corners]
         with np.errstate(over="ignore", invalid="ignore"):  # a box that is not finite is no box
-            world = np.matmul(np.array([corners[p.shape] for p in placed]), matrices).reshape(-1, 4)[:, :3]
-        return _finite_box(world.min(axis=0).tolist(), world.max(axis=0).tolist())
+            if placed:
+                matrices = np.array([p.item.get("transform", IDENTITY) for p in placed]).reshape(-1, 4, 4)
+                found.append(np.matmul(np.array([corners[p.shape] for p in placed]), matrices).reshape(-1, 4)[:, :3])
+            for item in group.instances:
+                box = self._box(item["group"], corners, boxes)
+                if box is None:
+                    continue
+                own = np.array(item.get("transform", IDENTITY)).reshape(4, 4)[:, :3]
+                rows = self._table.arrays[item["transforms"]].reshape(-1, 4, 3)
+                linear, offset = rows[:, :3] @ own[:3], rows[:, 3] @ own[:3] + own[3]
+                centre, half = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0])
+                middle, reach = centre @ linear + offset, half @ np.abs(linear)
+                usable = np.isfinite(middle).all(axis=1) & np.isfinite(reach).all(axis=1)
+                found += [(middle - reach)[usable], (middle + reach)[usable]]
+        points = np.concatenate(found) if found else np.empty((0, 3))
+        boxes[index] = (points.min(axis=0), points.max(axis=0)) if len(points) else None
+        return boxes[index]
 
     def stage_bounds(self) -> tuple[list[float], list[float]] | None:
         """Return the world box of the stage as USD computes it, prims included that are not rendered."""
@@ -301,11 +434,9 @@ def read_stage(
     render_settings: str | None,
     product: str | None,
     purposes: Sequence[str] | None,
-    variants: Sequence[str],
-    overrides: Overrides,
-    search_paths: Sequence[str | os.PathLike[str]],
     missing: str,
     strict: bool,
+    **opening: Unpack[Opening],
 ) -> Description:
     """Read a stage into a description; the arguments are those of :func:`abbe.usd.describe`."""
     if missing not in ("warn", "error"):
@@ -313,9 +444,9 @@ def read_stage(
     diagnostics = Diagnostics()
     source = source_name(stage_or_path)
     with quiet_usd(source, diagnostics):
-        opened = open_stage(
-            stage_or_path, variants=variants, overrides=overrides, search_paths=search_paths, diagnostics=diagnostics
-        )
+        # A mask keeps the camera and the settings that were asked for by path.
+        also = [path for path in (camera, render_settings, product) if path and path.startswith("/")]
+        opened = open_stage(stage_or_path, also=also, diagnostics=diagnostics, **opening)
         return _read(opened, diagnostics, frame, camera, render_settings, product, purposes, missing, strict)
 
 
@@ -337,7 +468,7 @@ def _read(
     walk = _Walk(opened, time, _purposes(purposes, settings_prim), diagnostics)
     walk.run()
     materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim))
-    placements = walk.bind(materials)
+    groups = walk.bind(materials)
 
     cameras: list[dict[str, Any]] = []
     index_by_camera: dict[Any, int] = {}
@@ -357,7 +488,8 @@ def _read(
     settings = read_settings(
         stage, settings_prim, time, time_code or 0.0, product, camera_index, bool(camera), source, diagnostics
     )
-    if not placements:
+    _warn_of_motion(walk.instancers.moving, cameras, settings, diagnostics)
+    if not any(group["items"] for group in groups):
         diagnostics.warn("nothing-to-render", source, "the stage has no geometry to render: every ray misses")
 
     document = {
@@ -365,7 +497,7 @@ def _read(
         "version": VERSION,
         "stage": metadata,
         "shapes": walk.shapes.shapes,
-        "groups": [{"path": "/", "items": placements}],
+        "groups": groups,
         "root": 0,
         "materials": materials.materials,
         "cameras": cameras,
@@ -373,7 +505,23 @@ def _read(
         "warnings": diagnostics.warnings(),
         "skipped": diagnostics.skipped,
     }
-    return Description(document, walk.shapes.arrays)
+    return Description(document, walk.arrays())
+
+
+def _warn_of_motion(
+    instancers: list[Any], cameras: list[dict[str, Any]], settings: dict[str, Any], diagnostics: Diagnostics
+) -> None:
+    """Warn of instancers that move where a camera's shutter is open for a while and blur is not turned off."""
+    base = settings.get("base")
+    products = settings["products"] or ([base] if base else [])
+    is_off = bool(products) and all(product["disable_motion_blur"] for product in products)
+    # A camera that frames the stage has no shutter.
+    if is_off or not any(c.get("shutter_close", 0.0) > c.get("shutter_open", 0.0) for c in cameras):
+        return
+    for prim in instancers:
+        diagnostics.warn(
+            "motion-blur", place(prim), "its instances move; they are rendered where they are at the frame"
+        )
 
 
 def _purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[str]:

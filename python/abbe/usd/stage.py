@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from ..errors import NotUsdError, StageError, UsageError
 from . import tokens
@@ -25,6 +25,7 @@ from .values import place
 
 __all__ = [
     "OpenedStage",
+    "Opening",
     "Overrides",
     "composition_warnings",
     "open_stage",
@@ -50,6 +51,17 @@ class OpenedStage:
     keep: list[Any] = field(default_factory=list)
     documents: dict[str, Any] = field(default_factory=dict)
     """MaterialX documents by asset identifier: the layer that stands for it, or why there is none."""
+
+
+class Opening(TypedDict, total=False):
+    """How a stage is opened; see :func:`abbe.usd.describe`."""
+
+    variants: Sequence[str]
+    overrides: Overrides
+    search_paths: Sequence[str | os.PathLike[str]]
+    session_layer: str | os.PathLike[str] | None
+    mask: Sequence[str]
+    payloads: str
 
 
 def source_name(stage_or_path: Any) -> str:
@@ -124,9 +136,15 @@ def open_stage(
     variants: Sequence[str] = (),
     overrides: Overrides = (),
     search_paths: Sequence[str | os.PathLike[str]] = (),
+    session_layer: str | os.PathLike[str] | None = None,
+    mask: Sequence[str] = (),
+    payloads: str = "all",
+    also: Sequence[str] = (),
     diagnostics: Diagnostics,
 ) -> OpenedStage:
     """Open a file, or take a stage in memory, with the variants and values asked for.
+
+    ``also`` are paths that a mask keeps if they are there; the other arguments are those of :func:`abbe.usd.describe`.
 
     Raises
     ------
@@ -135,17 +153,30 @@ def open_stage(
     StageError
         The file is no stage, or an override names what is not there.
     """
+    if payloads not in ("all", "none"):
+        raise UsageError(f"payloads '{payloads}': choose 'all' or 'none'")
     if isinstance(stage_or_path, Usd.Stage):
         opened = _from_memory(stage_or_path, search_paths)
+        if payloads == "none":
+            _own(opened)
+            opened.stage.SetLoadRules(Usd.StageLoadRules.LoadNone())
     else:
-        opened = _from_file(stage_or_path, search_paths, diagnostics)
+        opened = _from_file(stage_or_path, search_paths, payloads == "all", diagnostics)
+    if session_layer is not None:
+        _add_session_layer(opened, os.fspath(session_layer))
+    if mask:
+        _mask(opened, mask, also)
     bring_in_documents(opened, diagnostics)
     _apply(opened, variants, overrides, diagnostics)
+    if opened.stage.GetLoadRules() != Usd.StageLoadRules.LoadAll():
+        unloaded = set(opened.stage.FindLoadable()) - set(opened.stage.GetLoadSet())
+        if unloaded:
+            diagnostics.skip("payload not loaded", len(unloaded))
     return opened
 
 
 def _from_file(
-    stage_or_path: Any, search_paths: Sequence[str | os.PathLike[str]], diagnostics: Diagnostics
+    stage_or_path: Any, search_paths: Sequence[str | os.PathLike[str]], loads: bool, diagnostics: Diagnostics
 ) -> OpenedStage:
     try:
         path = os.fspath(stage_or_path)
@@ -158,8 +189,64 @@ def _from_file(
     context = _context(path, search_paths, diagnostics)
     root = _root_layer(path, context)
     session = _session_layer()
-    stage = _compose(lambda: Usd.Stage.Open(root, session, context), path)
+    load = Usd.Stage.LoadAll if loads else Usd.Stage.LoadNone
+    stage = _compose(lambda: Usd.Stage.Open(root, session, context, load), path)
     return OpenedStage(stage, path, session, [root])
+
+
+def _add_session_layer(opened: OpenedStage, path: str) -> None:
+    """Put the layer ``path`` above all layers of the stage, below what else was asked for."""
+    _own(opened)
+    layer = _root_layer(path, opened.stage.GetPathResolverContext())
+    if layer == opened.stage.GetRootLayer():
+        raise UsageError(f"session layer {path}: is the stage itself: name another layer")
+    # Stage metadata is read from the session's root layer alone.
+    UsdUtils.CopyLayerMetadata(layer, opened.session, True)
+    opened.session.subLayerPaths = [layer.identifier, *opened.session.subLayerPaths]
+    opened.keep.append(layer)
+
+
+# What a prim that a mask keeps needs beside its own: materials, prototypes, and what render settings name.
+_NEEDED_TARGETS = (tokens.PROTOTYPES, tokens.PRODUCTS, tokens.ORDERED_VARS, tokens.CAMERA)
+
+
+def _mask(opened: OpenedStage, paths: Sequence[str], also: Sequence[str]) -> None:
+    """Leave out of the stage what is neither below ``paths`` nor needed by what is."""
+    if isinstance(paths, str):
+        raise UsageError("mask: is a list, not one string: put brackets around it")
+    _own(opened)
+    wanted = Usd.StagePopulationMask()
+    for path in paths:
+        if not path.startswith("/") or not Sdf.Path.IsValidPathString(path) or Sdf.Path(path).IsPropertyPath():
+            raise UsageError(f"mask: '{path}' is no prim path: give one such as /World/Ball")
+        wanted.Add(Sdf.Path(path))
+    wanted = Usd.StagePopulationMask.Intersection(wanted, opened.stage.GetPopulationMask())
+    settings = opened.stage.GetMetadata(tokens.RENDER_SETTINGS_PRIM_PATH)
+    for path in (*also, *([settings] if settings else [])):
+        if Sdf.Path.IsValidPathString(path) and Sdf.Path(path).IsPrimPath():
+            wanted.Add(Sdf.Path(path))
+    opened.stage.SetPopulationMask(wanted)
+    for path in paths:
+        if not opened.stage.GetPrimAtPath(path):
+            raise StageError(f"<{path}>: there is no such prim in {opened.source}: correct mask '{path}'")
+    while True:
+        opened.stage.ExpandPopulationMask(relationshipPredicate=_is_needed)
+        expanded = opened.stage.GetPopulationMask()
+        # USD itself does not look into what instances share.
+        for prototype in opened.stage.GetPrototypes():
+            for prim in Usd.PrimRange(prototype):
+                for relationship in filter(_is_needed, prim.GetAuthoredRelationships()):
+                    for target in relationship.GetForwardedTargets():
+                        if not Usd.Prim.IsPathInPrototype(target) and not expanded.Includes(target.GetPrimPath()):
+                            expanded.Add(target.GetPrimPath())
+        if expanded == opened.stage.GetPopulationMask():
+            return
+        opened.stage.SetPopulationMask(expanded)
+
+
+def _is_needed(relationship: Any) -> bool:
+    name = relationship.GetName()
+    return name in _NEEDED_TARGETS or name.startswith(tokens.MATERIAL_BINDING)
 
 
 def _session_layer() -> Any:

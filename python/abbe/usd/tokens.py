@@ -31,6 +31,16 @@ DRAW_MODE: Final = "model:drawMode"
 APPLY_DRAW_MODE: Final = "model:applyDrawMode"
 FULL_DRAW_MODES: Final = ("default", "inherited", "")
 
+# PointInstancer.
+PROTOTYPES: Final = "prototypes"
+PROTO_INDICES: Final = "protoIndices"
+POSITIONS: Final = "positions"
+ORIENTATIONS: Final = "orientations"
+ORIENTATIONS_F: Final = "orientationsf"
+SCALES: Final = "scales"
+IDS: Final = "ids"
+MOTION_NAMES: Final = ("velocities", "accelerations", "angularVelocities")
+
 # Sphere, Cube, Plane, Cylinder, Cone, Capsule.
 RADIUS: Final = "radius"
 RADIUS_BOTTOM: Final = "radiusBottom"

@@ -114,6 +114,9 @@ def validate(
     variants: Sequence[str] = (),
     overrides: Mapping[str, Any] | Sequence[str] = (),
     search_paths: Sequence[str | os.PathLike[str]] = (),
+    session_layer: str | os.PathLike[str] | None = None,
+    mask: Sequence[str] = (),
+    payloads: str = "all",
     purposes: Sequence[str] | None = None,
     missing: str = "warn",
     validators: Sequence[str] | None = None,
@@ -123,7 +126,8 @@ def validate(
     Parameters
     ----------
     stage_or_path : path of a .usd, .usda, .usdc or .usdz file, or a ``pxr.Usd.Stage``, which is not changed
-    frame, variants, overrides, search_paths, purposes, missing : as for :func:`abbe.render`
+    frame, variants, overrides, search_paths, session_layer, mask, payloads, purposes, missing : as for
+        :func:`abbe.render`
     validators : names of :data:`VALIDATORS`; all if None
 
     Returns
@@ -156,6 +160,9 @@ def validate(
         variants=variants,
         overrides=overrides,
         search_paths=search_paths,
+        session_layer=session_layer,
+        mask=mask,
+        payloads=payloads,
         purposes=purposes,
         missing=missing,
     ) as reading:

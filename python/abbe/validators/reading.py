@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from ..usd._pxr import Sdf, Usd, UsdShade
 from ..usd.description import Array, Description, Diagnostics
 from ..usd.materials import MaterialReader
 from ..usd.render import all_settings, read_settings
-from ..usd.stage import OpenedStage, open_stage, quiet_usd, source_name, stage_metadata, stage_time
+from ..usd.stage import OpenedStage, Opening, open_stage, quiet_usd, source_name, stage_metadata, stage_time
 from . import Finding, Severity
 
 __all__ = ["CompiledMaterial", "Reading", "Remark", "read", "shared_source"]
@@ -302,16 +301,12 @@ def read(
     stage_or_path: Any,
     *,
     frame: float | Literal["default"] | None,
-    variants: Sequence[str],
-    overrides: Mapping[str, Any] | Sequence[str],
-    search_paths: Sequence[str | os.PathLike[str]],
     purposes: Sequence[str] | None,
     missing: str,
+    **opening: Unpack[Opening],
 ) -> Iterator[Reading]:
     """Open a stage for validators; the arguments are those of :func:`abbe.validators.validate`."""
     diagnostics = Diagnostics()
     with quiet_usd(source_name(stage_or_path), diagnostics):
-        opened = open_stage(
-            stage_or_path, variants=variants, overrides=overrides, search_paths=search_paths, diagnostics=diagnostics
-        )
+        opened = open_stage(stage_or_path, diagnostics=diagnostics, **opening)
         yield Reading(opened, frame, purposes, missing)

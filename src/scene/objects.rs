@@ -1,0 +1,126 @@
+//! Placed shapes and their identifiers: single ones, and arrays that store once what their objects share.
+
+use std::sync::Arc;
+
+use glam::DAffine3;
+
+use crate::geometry::{Buffer, Instance, InstanceArray, Location, Numbering, Shape};
+
+/// A placed shape.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// The shape, shared between its placements.
+    pub shape: Arc<Shape>,
+    /// Stage world from object space.
+    pub world_from_object: DAffine3,
+    /// `prim_id`: 1-based index into [`Scene::prims`](super::Scene::prims).
+    pub prim_id: u32,
+    /// `instance_id`: what [`Scene::instances`](super::Scene::instances) counts, 0 for none.
+    pub instance_id: u32,
+    /// Material per slot (slot 0: faces in no subset): `material_id`, 1-based index into
+    /// [`Scene::materials`](super::Scene::materials), 0 for none.
+    pub material_ids: Arc<[u32]>,
+}
+
+/// What every place of an array has of one part.
+#[derive(Clone, Debug)]
+pub struct PartIds {
+    /// `prim_id`.
+    pub prim_id: u32,
+    /// Material per slot.
+    pub material_ids: Arc<[u32]>,
+}
+
+/// Shapes placed by an array of transforms.
+#[derive(Clone, Debug)]
+pub struct ObjectArray {
+    /// Where they stand.
+    pub instances: InstanceArray,
+    /// Identifiers of the parts.
+    pub parts: Arc<[PartIds]>,
+    /// `instance_id` of the instancer's element 0.
+    pub first_id: u32,
+    /// Which element of the instancer stands at each place; its own number if absent.
+    pub indices: Option<Buffer<i32>>,
+}
+
+/// The identifiers of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ObjectIds<'a> {
+    /// 1-based index into [`Scene::prims`](super::Scene::prims).
+    pub prim_id: u32,
+    /// What [`Scene::instances`](super::Scene::instances) counts, 0 for none.
+    pub instance_id: u32,
+    /// Material per slot.
+    pub material_ids: &'a [u32],
+}
+
+/// All placed shapes, numbered: single ones first, then array by array, place by place, part by part. The number is the
+/// tie-breaker between coincident surfaces.
+#[derive(Clone, Debug, Default)]
+pub struct Objects {
+    singles: Vec<Object>,
+    arrays: Vec<ObjectArray>,
+    numbering: Numbering,
+}
+
+impl Objects {
+    /// Arrays have at least one place and one part; there are less than 2^32 objects.
+    pub(super) fn new(singles: Vec<Object>, arrays: Vec<ObjectArray>) -> Self {
+        let sizes = arrays.iter().map(|a| (a.instances.places.len(), a.instances.parts.len()));
+        let numbering = Numbering::new(singles.len(), sizes);
+        Self { singles, arrays, numbering }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> u32 {
+        self.numbering.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.numbering.is_empty()
+    }
+
+    /// Those placed one by one.
+    pub fn singles(&self) -> &[Object] {
+        &self.singles
+    }
+
+    /// Those placed by arrays.
+    pub fn arrays(&self) -> &[ObjectArray] {
+        &self.arrays
+    }
+
+    /// What [`Aggregate::with_arrays`](crate::geometry::Aggregate::with_arrays) takes; it numbers the same way.
+    pub(super) fn instances(&self) -> (Vec<Instance>, Vec<InstanceArray>) {
+        let single = |o: &Object| Instance { shape: Arc::clone(&o.shape), world_from_object: o.world_from_object };
+        (self.singles.iter().map(single).collect(), self.arrays.iter().map(|a| a.instances.clone()).collect())
+    }
+
+    /// The identifiers of the object `index`.
+    pub fn ids(&self, index: u32) -> ObjectIds<'_> {
+        match self.numbering.locate(index) {
+            Location::Single(i) => {
+                let Object { prim_id, instance_id, ref material_ids, .. } = self.singles[i];
+                ObjectIds { prim_id, instance_id, material_ids }
+            }
+            Location::InArray { array, place, part } => {
+                let array = &self.arrays[array];
+                let element = array.indices.as_ref().map_or(place as u32, |indices| indices[place] as u32);
+                let PartIds { prim_id, ref material_ids } = array.parts[part];
+                ObjectIds { prim_id, instance_id: array.first_id + element, material_ids }
+            }
+        }
+    }
+
+    /// Every combination of shape and identifiers once: (shape, prim_id, materials).
+    pub fn kinds(&self) -> impl Iterator<Item = (&Shape, u32, &[u32])> {
+        let singles = self.singles.iter().map(|o| (&*o.shape, o.prim_id, &*o.material_ids));
+        let parts = self.arrays.iter().flat_map(|a| {
+            let ids = a.instances.parts.iter().zip(&*a.parts);
+            ids.map(|(part, ids)| (&*part.shape, ids.prim_id, &*ids.material_ids))
+        });
+        singles.chain(parts)
+    }
+}
