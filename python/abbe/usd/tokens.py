@@ -238,4 +238,10 @@ VAR_NAMES: Final = {
     "abbe:spectral:band": "double2",
     "abbe:spectral:binWidth": "double",
 }
-OUR_SCHEMAS: Final = {"Material": MATERIAL_NAMES, RENDER_SETTINGS: SETTINGS_NAMES, RENDER_VAR: VAR_NAMES}
+OUR_SCHEMAS: Final = {
+    "Material": MATERIAL_NAMES,
+    "Mesh": LENS_NAMES,
+    "Xform": LENS_NAMES,
+    RENDER_SETTINGS: SETTINGS_NAMES,
+    RENDER_VAR: VAR_NAMES,
+}
