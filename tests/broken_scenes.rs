@@ -153,6 +153,51 @@ fn a_sphere_without_a_size_is_refused() {
 }
 
 #[test]
+fn solids_without_a_size_are_left_out_or_refused() {
+    let solids = |size: f64| {
+        let (path, axis) = (|| "/World/Solid".to_owned(), || "X".to_owned());
+        [
+            ("size", Shape::Cube { path: path(), size }),
+            ("length", Shape::Plane { path: path(), width: 1.0, length: size, axis: axis() }),
+            (
+                "height",
+                Shape::Cylinder { path: path(), height: size, radius_bottom: 1.0, radius_top: 0.5, axis: axis() },
+            ),
+            (
+                "radius",
+                Shape::Cylinder { path: path(), height: 1.0, radius_bottom: size, radius_top: size, axis: axis() },
+            ),
+            ("radius", Shape::Cone { path: path(), height: 1.0, radius: size, axis: axis() }),
+            (
+                "radius",
+                Shape::Capsule { path: path(), height: 1.0, radius_bottom: size, radius_top: size, axis: axis() },
+            ),
+        ]
+    };
+    for (name, solid) in [-1.0, f64::NAN, f64::INFINITY].into_iter().flat_map(solids) {
+        let mut s = ball();
+        s.solid(solid, DMat4::IDENTITY, None);
+        assert_says(&error(s.description()), &format!("/World/Solid.{name}"), "must be finite and not negative");
+    }
+    for (_, solid) in solids(0.0) {
+        let mut s = ball();
+        s.solid(solid, DMat4::IDENTITY, None);
+        let scene = s.build();
+        assert_eq!(scene.objects.len(), 2);
+        let warning = scene.diagnostics().warnings().iter().find(|w| w.kind == "empty-shape").expect("a warning");
+        assert_eq!(warning.places, ["/World/Solid"]);
+    }
+    let mut s = ball();
+    s.solid(Shape::Cone { path: "/C".into(), height: 1.0, radius: 1.0, axis: "W".into() }, DMat4::IDENTITY, None);
+    assert_says(&error(s.description()), "/C.axis", "X, Y or Z");
+    // No sphere touches a cone that is flat.
+    let mut s = ball();
+    let flat = Shape::Capsule { path: "/C".into(), height: 0.0, radius_bottom: 1.0, radius_top: 2.0, axis: "Z".into() };
+    s.solid(flat, DMat4::IDENTITY, None);
+    assert_says(&error(s.description()), "/C", "height 0, radiusBottom 1, radiusTop 2: there is no such solid");
+}
+
+#[test]
 fn open_glass_is_warned_of() {
     let mut s = Stagehand::new();
     let glass = s.glass("/World/Glass", support::BK7);

@@ -2,10 +2,14 @@
 
 mod support;
 
+use abbe::geometry::{Departures, Ray};
 use abbe::scene::Scene;
-use abbe::scene::description::{Array, Description, Element, Group, Instances, Placement};
+use abbe::scene::description::{
+    Array, Description, Element, Group, Instances, Lens, LensFace, Placement, Shape, Target,
+};
+use abbe::scene::view::View;
 use glam::{DAffine3, DMat3, DMat4, DVec3};
-use support::{BK7, Stagehand, floats, integers, rendered, request};
+use support::{BK7, SF11, Stagehand, floats, integers, rendered, request};
 
 const AOVS: [&str; 5] = ["position", "refracted_position", "dispersion", "prim_id", "material_id"];
 
@@ -46,13 +50,57 @@ fn instances(path: &str, group: usize, transforms: &str, count: usize) -> Instan
     Instances { path: path.into(), group, transform: None, transforms: transforms.into(), indices: None, count }
 }
 
-/// The lamp at all places, by an array.
-fn by_array() -> Description {
-    let (mut s, parts) = stagehand();
+/// What `stagehand` and its like prepare at all places, by an array.
+fn at_places((mut s, parts): (Stagehand, Vec<Placement>)) -> Description {
     s.document.groups.push(Group { path: "/World/P".into(), items: parts, instances: vec![] });
     s.arrays.insert("places".into(), rows(&places()));
     s.document.groups[0].instances.push(instances("/World/Lamps", 1, "places", 12));
     s.description()
+}
+
+/// The same, each part placed by itself.
+fn one_by_one((mut s, parts): (Stagehand, Vec<Placement>)) -> Description {
+    for place in places() {
+        for part in &parts {
+            let local = DAffine3::from_mat4(DMat4::from_cols_array(&part.transform.unwrap()));
+            let transform = Some(DMat4::from(place * local).to_cols_array());
+            s.document.groups[0].items.push(Placement { transform, ..part.clone() });
+        }
+    }
+    s.description()
+}
+
+/// The lamp at all places, by an array.
+fn by_array() -> Description {
+    at_places(stagehand())
+}
+
+/// A wall, and in no group yet: a cemented doublet, a cylinder, a cone that nothing is left of, a capsule, a plane.
+fn solids() -> (Stagehand, Vec<Placement>) {
+    let face = |curvature: f64| LensFace { curvature, conic: -0.3, aspheres: vec![], semi_diameter: 0.5 };
+    let lens = |path: &str, front: f64, back: f64, thickness: f64| {
+        let path = path.to_owned();
+        Shape::Lens(Lens { path, front: face(front), back: face(back), thickness, edge_radius: None })
+    };
+    let (path, axis) = (|name: &str| format!("/World/P/{name}"), || "X".to_owned());
+    let at = |y: f64, z: f64| DMat4::from_translation(DVec3::new(0.0, y, z));
+    let mut s = Stagehand::new();
+    let (crown, flint) = (s.glass("/World/Crown", BK7), s.glass("/World/Flint", SF11));
+    let grey = s.diffuse("/World/Grey");
+    s.wall(-6.0, 40.0, Some(grey));
+    s.solid(lens("/World/P/Crown", 0.3, -0.4, 0.4), at(0.5, 0.0), Some(crown));
+    s.solid(lens("/World/P/Flint", -0.4, 0.1, 0.2), at(0.5, 0.4), Some(flint));
+    let (radius_bottom, radius_top) = (0.2, 0.25);
+    let cylinder = Shape::Cylinder { path: path("Cylinder"), height: 0.8, radius_bottom, radius_top, axis: axis() };
+    s.solid(cylinder, at(-0.5, 0.1), Some(crown));
+    s.solid(Shape::Cone { path: path("Flat"), height: 0.0, radius: 1.0, axis: axis() }, at(0.0, 0.0), Some(grey));
+    let (radius_bottom, radius_top) = (0.1, 0.1);
+    let capsule = Shape::Capsule { path: path("Capsule"), height: 0.6, radius_bottom, radius_top, axis: axis() };
+    s.solid(capsule, at(-0.15, 0.2), Some(flint));
+    s.solid(Shape::Plane { path: path("Plane"), width: 0.3, length: 0.6, axis: axis() }, at(-0.8, 0.1), Some(grey));
+    s.camera(DVec3::new(0.3, 0.4, 12.0), DVec3::ZERO);
+    let parts = s.document.groups[0].items.split_off(1);
+    (s, parts)
 }
 
 fn scene(description: Description) -> Scene {
@@ -73,18 +121,58 @@ fn assert_same_pixels(a: &Scene, b: &Scene) {
 
 #[test]
 fn an_array_gives_the_bits_of_placing_one_by_one() {
-    let (mut s, parts) = stagehand();
-    for place in places() {
-        for part in &parts {
-            let local = DAffine3::from_mat4(DMat4::from_cols_array(&part.transform.unwrap()));
-            let transform = Some(DMat4::from(place * local).to_cols_array());
-            s.document.groups[0].items.push(Placement { transform, ..part.clone() });
-        }
-    }
     let array = scene(by_array());
-    assert_same_pixels(&array, &s.build());
+    assert_same_pixels(&array, &scene(one_by_one(stagehand())));
     assert_eq!(array.objects.len(), 25);
     assert_eq!(array.counts.shapes, 3);
+}
+
+#[test]
+fn lenses_and_solids_of_an_array_are_those_placed_one_by_one() {
+    let (array, plain) = (scene(at_places(solids())), scene(one_by_one(solids())));
+    assert_same_pixels(&array, &plain);
+    // The wall, and what is left of six parts at twelve places.
+    assert_eq!((array.objects.len(), array.counts.shapes), (61, 6));
+    assert_eq!(array.objects.singles().len(), 1);
+    assert_eq!(array.prims.entries(), plain.prims.entries());
+    assert_eq!(array.instances.entries(), ["/World/Lamps[0:12]"]);
+    assert!(array.diagnostics().warnings().iter().any(|w| w.kind == "empty-shape" && w.places == ["/World/P/Flat"]));
+
+    // A group placed by itself, as native instances are.
+    let (mut native, parts) = solids();
+    native.document.groups.push(Group { path: "/Prototype".into(), items: parts, instances: vec![] });
+    for (i, place) in places().into_iter().enumerate() {
+        native.document.groups[0].items.push(Placement {
+            path: "/Prototype".into(),
+            target: Target::Group(1),
+            transform: Some(DMat4::from(place).to_cols_array()),
+            material: None,
+            subset_materials: vec![],
+            instance: Some(format!("/World/Lamp{i}")),
+            double_sided: false,
+        });
+    }
+    assert_same_pixels(&array, &scene(native.description()));
+
+    // What touches what is found the same way, and a doublet's elements touch.
+    let origin = DVec3::new(0.3, 0.4, 12.0);
+    let (array_view, plain_view) = (View::new(&array, origin), View::new(&plain, origin));
+    let mut elements = 0;
+    for (i, j) in (-30..=30).flat_map(|i| (-24..=24).map(move |j| (i, j))) {
+        let direction = DVec3::new(0.1 * f64::from(i), 0.1 * f64::from(j), -12.0).normalize();
+        let ray = Ray { origin: DVec3::ZERO, direction };
+        let hits = [&array_view, &plain_view].map(|view| view.intersect(&ray, &Departures::none()));
+        assert_eq!(hits[0], hits[1]);
+        let Some(hit) = hits[0] else { continue };
+        assert_eq!(array_view.is_touching(&hit), plain_view.is_touching(&hit));
+        assert_eq!(array_view.is_in_contact(&hit), plain_view.is_in_contact(&hit));
+        let path = array.prims.path(array.objects.ids(hit.instance).prim_id).unwrap();
+        if path.ends_with("/Crown") || path.ends_with("/Flint") {
+            assert!(array_view.is_touching(&hit) && array_view.is_in_contact(&hit));
+            elements += 1;
+        }
+    }
+    assert!(elements > 100, "{elements}");
 }
 
 #[test]

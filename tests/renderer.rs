@@ -271,6 +271,7 @@ fn scaled(mut s: Stagehand, scale: f64) -> Stagehand {
                     .collect();
                 *array = abbe::scene::description::Array::from_vec(abbe::scene::description::Element::F32, 3, scaled);
             }
+            other => unreachable!("{} is no sphere and no mesh", other.path()),
         }
     }
     let place = |m: &mut [f64; 16]| m[12..15].iter_mut().for_each(|v| *v *= scale);

@@ -24,6 +24,14 @@ pub(super) fn lambda_column(start: &RayStart, medium: &IorJet, log: &[Step]) -> 
                 let ds = gradient.as_mat3() * point;
                 (ds - normal * normal.dot(ds)) / vector.length() as f32
             }
+            NormalField::Revolved { vector, radial, around, second, .. } => {
+                let along = |covector: glam::DVec3, rate: f64| {
+                    let covector = covector.as_vec3();
+                    covector * (rate as f32 * covector.dot(point))
+                };
+                let ds = along(radial, second[0]) + along(around, second[1]);
+                (ds - normal * normal.dot(ds)) / vector.length() as f32
+            }
         };
         let dg = momentum.dot(normal) + s.momentum_in.as_vec3().dot(dnormal);
         let deflection = s.deflection as f32;

@@ -169,11 +169,11 @@ impl Aggregate {
         self.with(hit.instance, |placed| placed.local_surface(ray, hit))
     }
 
-    /// Texture coordinates at a hit; `None` where none are authored (always, for spheres). `_point`, the refined hit point,
-    /// is for shapes whose coordinates come from the position.
+    /// Texture coordinates at a hit; `None` where none are authored (always, for analytic shapes). `_point`, the refined hit
+    /// point, is for shapes whose coordinates come from the position.
     pub fn uv(&self, hit: &Hit, _point: DVec3) -> Option<[f64; 2]> {
         match self.shape(hit.instance) {
-            Shape::Sphere(_) => None,
+            Shape::Sphere(_) | Shape::Solid(_) => None,
             Shape::Mesh(mesh) => mesh.uv(hit.primitive, hit.barycentric),
         }
     }
@@ -181,7 +181,7 @@ impl Aggregate {
     /// The material slot that was hit: 0 for faces in no subset, k + 1 for the k-th subset.
     pub fn slot(&self, hit: &Hit) -> u32 {
         match self.shape(hit.instance) {
-            Shape::Sphere(_) => 0,
+            Shape::Sphere(_) | Shape::Solid(_) => 0,
             Shape::Mesh(mesh) => mesh.slot(hit.primitive),
         }
     }
@@ -223,7 +223,7 @@ impl Aggregate {
             self.with(instance, |placed| {
                 let object = placed.ray(ray);
                 match placed.shape {
-                    Shape::Sphere(_) => placed.intersect(ray, instance, None, &mut nearest),
+                    Shape::Sphere(_) | Shape::Solid(_) => placed.intersect(ray, instance, None, &mut nearest),
                     Shape::Mesh(mesh) => {
                         let mut sides = Sides::new(f64::INFINITY);
                         mesh.every_crossing(object.origin, object.direction, |hit| {
@@ -317,6 +317,12 @@ impl ObjectRay {
             at_start: hit.at_start,
         }
     }
+
+    /// The same for an analytic shape.
+    fn analytic_hit(&self, instance: u32, primitive: u32, met: Met, leaving: bool) -> Hit {
+        let Met { distance, at_start } = met;
+        Hit { distance: distance / self.stretch, instance, primitive, barycentric: [0.0; 2], leaving, at_start }
+    }
 }
 
 impl Placed<'_> {
@@ -349,7 +355,19 @@ impl Placed<'_> {
                     }),
                 };
                 if let Some((met, leaving)) = found {
-                    nearest.offer(sphere_hit(instance, met.distance / object.stretch, leaving, met.at_start));
+                    nearest.offer(object.analytic_hit(instance, 0, met, leaving));
+                }
+            }
+            Shape::Solid(solid) => {
+                let found = match start {
+                    Some(start) => start.solid(solid, object.origin, object.direction),
+                    None => solid
+                        .borders(object.origin, object.direction, None)
+                        .ahead()
+                        .map(|border| (Met { distance: border.distance, at_start: false }, border)),
+                };
+                if let Some((met, border)) = found {
+                    nearest.offer(object.analytic_hit(instance, border.primitive, met, border.leaving));
                 }
             }
         }
@@ -367,14 +385,17 @@ impl Placed<'_> {
                     sphere.roots(object.origin, object.direction).into_iter().flatten().zip([false, true])
                 {
                     if root > 0.0 {
-                        f(&sphere_hit(instance, root / object.stretch, leaving, false));
+                        f(&object.analytic_hit(instance, 0, Met { distance: root, at_start: false }, leaving));
                     }
+                }
+            }
+            Shape::Solid(solid) => {
+                let borders = solid.borders(object.origin, object.direction, None);
+                for border in borders.as_slice().iter().filter(|b| b.distance > 0.0) {
+                    let met = Met { distance: border.distance, at_start: false };
+                    f(&object.analytic_hit(instance, border.primitive, met, border.leaving));
                 }
             }
         }
     }
-}
-
-fn sphere_hit(instance: u32, distance: f64, leaving: bool, at_start: bool) -> Hit {
-    Hit { distance, instance, primitive: 0, barycentric: [0.0; 2], leaving, at_start }
 }

@@ -2,7 +2,7 @@
 //!
 //! Conventions: *render space* is the stage's world minus the camera position, in f64. Points stay as authored, f32 in
 //! object space, and no transform is baked into them; rays go to object space instead. f32 boxes find what a ray may
-//! meet (`tree.rs`, `walk.rs`), f64 shapes decide it (`triangle.rs`, `sphere.rs`), so the tree never decides what is hit. Every
+//! meet (`tree.rs`, `walk.rs`), f64 shapes decide it (`triangle.rs`, `sphere.rs`, `solid.rs`), so the tree never decides what is hit. Every
 //! tolerance is a rounding bound of the numbers at hand: scaling a scene by a power of two changes no bit.
 //!
 //! A triangle covers its border half-open, by exact signs (`triangle.rs`): a ray through an edge or a vertex of a closed
@@ -11,12 +11,17 @@
 //! Limits: object-space points between about 1e-37 and 1e37 in size keep all this; f32 has no digits below.
 
 mod aggregate;
+mod asphere;
 mod buffer;
+mod cuboid;
 mod departures;
 mod instances;
 mod mesh;
 mod placed;
 mod polygons;
+mod profile;
+mod revolved;
+mod solid;
 mod sphere;
 mod start;
 mod surface;
@@ -29,12 +34,15 @@ use glam::DVec3;
 
 pub use aggregate::Aggregate;
 pub use buffer::Buffer;
+pub use cuboid::{Cuboid, Rectangle};
 pub use departures::Departures;
 pub(crate) use instances::affine;
 pub use instances::{Instance, InstanceArray, Location, Numbering, Part};
 pub use mesh::{Mesh, MeshReport};
 pub(crate) use placed::is_invertible;
 pub use polygons::{Interpolation, PolygonMesh, PrimvarView};
+pub use revolved::{Cap, Revolved};
+pub use solid::{Axis, Solid};
 pub use sphere::Sphere;
 
 /// A ray in render space.
@@ -53,9 +61,9 @@ pub struct Hit {
     pub distance: f64,
     /// Index of the instance.
     pub instance: u32,
-    /// Triangle of the mesh; 0 for a sphere.
+    /// Triangle of the mesh, piece of the solid's surface; 0 for a sphere.
     pub primitive: u32,
-    /// Weights of the triangle's second and third corner; 0 for a sphere.
+    /// Weights of the triangle's second and third corner; 0 for analytic shapes.
     pub barycentric: [f64; 2],
     /// The ray leaves the shape: direction · n_g > 0 with n_g outward as authored. Never 0: a ray that only touches a
     /// surface does not meet it.
@@ -70,6 +78,8 @@ pub struct Hit {
 pub enum Shape {
     /// An analytic sphere about the origin; an ellipsoid under a transform that is no similarity.
     Sphere(Sphere),
+    /// Another analytic shape.
+    Solid(Solid),
     /// Triangles.
     Mesh(Mesh),
 }

@@ -103,6 +103,8 @@ impl Frame {
 impl Placed<'_> {
     /// Bounds in render space, outward by the rounding of the transforms; `None` for a shape without extent.
     pub(super) fn bounds(&self) -> Option<Bounds> {
+        let about =
+            |[min, max]: [DVec3; 2]| (self.point(0.5 * (min + max)), absolute(self.linear) * (0.5 * (max - min)));
         let (center, half) = match self.shape {
             Shape::Sphere(sphere) => {
                 // The extent of the ellipsoid L·S² along an axis is the length of that row of L.
@@ -110,11 +112,8 @@ impl Placed<'_> {
                 let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
                 (self.translation, half * sphere.radius())
             }
-            Shape::Mesh(mesh) => {
-                let [min, max] = mesh.bounds()?;
-                let half = 0.5 * (max - min);
-                (self.point(0.5 * (min + max)), absolute(self.linear) * half)
-            }
+            Shape::Solid(solid) => about(solid.bounds()),
+            Shape::Mesh(mesh) => about(mesh.bounds()?),
         };
         let magnitude = self.reach_of(self.extent()) * self.condition();
         let error = DVec3::splat(BOX_ERRORS * UNIT_ROUNDOFF * magnitude);
@@ -136,6 +135,7 @@ impl Placed<'_> {
     fn extent(&self) -> f64 {
         match self.shape {
             Shape::Sphere(sphere) => sphere.radius(),
+            Shape::Solid(solid) => solid.extent(),
             Shape::Mesh(mesh) => mesh.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element()),
         }
     }
@@ -144,6 +144,7 @@ impl Placed<'_> {
     pub(super) fn reach(&self, primitive: u32) -> f64 {
         let extent = match self.shape {
             Shape::Sphere(sphere) => sphere.radius(),
+            Shape::Solid(solid) => solid.extent(),
             Shape::Mesh(mesh) => mesh.corners(primitive).into_iter().map(|p| p.abs().max_element()).fold(0.0, f64::max),
         };
         self.reach_of(extent)

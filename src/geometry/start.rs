@@ -11,6 +11,7 @@
 use glam::DVec3;
 
 use super::departures::Crossing;
+use super::solid::{Border, Solid};
 use super::triangle::TriangleHit;
 
 /// 2^-53, half the distance from 1 to the next f64.
@@ -170,6 +171,43 @@ impl Start<'_> {
             let height = distance * ((origin + distance * direction).dot(direction)).abs() / radius;
             (Met { distance, at_start: height <= KEPT * error }, leaving)
         })
+    }
+
+    /// Where a solid is met.
+    ///
+    /// If the ray stands on the solid, its side is known: from the last crossing, or, where that has yet to be made, from
+    /// the way the ray arrived. What another surface here has done to the ray since may have turned it to the other side.
+    pub(super) fn solid(&self, solid: &Solid, origin: DVec3, direction: DVec3) -> Option<(Met, Border)> {
+        let error = UNIT_ROUNDOFF * START_ERRORS * self.magnitude;
+        let standing = match self.last() {
+            Some((crossing, is_last)) => Some((crossing.primitive, !crossing.outward, is_last)),
+            None => solid
+                .piece_at(origin, error, |_| true)
+                .map(|primitive| (primitive, self.arrival.dot(solid.piece(primitive, origin).gradient) > 0.0, false)),
+        };
+        let border = match standing {
+            None => solid.borders(origin, direction, None).ahead()?,
+            Some((primitive, inside, settled)) => {
+                // After the event itself the side is known better than the sign of a rounded product.
+                let along = direction.dot(solid.piece(primitive, origin).gradient);
+                if !settled && if inside { along > 0.0 } else { along < 0.0 } {
+                    let border = Border { distance: 0.0, primitive, leaving: inside };
+                    return Some((Met { distance: 0.0, at_start: true }, border));
+                }
+                if !inside && solid.is_convex() {
+                    return None;
+                }
+                let borders = solid.borders(origin, direction, Some(primitive));
+                match borders.next(inside, primitive, solid.is_closed()) {
+                    None if inside && solid.is_closed() => solid.way_out(origin, direction, primitive, KEPT * error),
+                    border => border?,
+                }
+            }
+        };
+        let normal = solid.piece(border.primitive, origin + border.distance * direction).gradient;
+        let height = border.distance * direction.dot(normal).abs();
+        let at_start = height <= KEPT * error * normal.length();
+        Some((Met { distance: border.distance, at_start }, border))
     }
 }
 

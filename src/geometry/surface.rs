@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::mesh::Mesh;
 use super::placed::Placed;
+use super::solid::{Bend, Solid};
 use super::sphere::Sphere;
 use super::{Hit, Ray, Shape};
 use crate::ray::{Curvature, LocalSurface, NormalField};
@@ -16,6 +17,7 @@ impl Placed<'_> {
         match self.shape {
             Shape::Mesh(mesh) => self.facet(mesh, hit),
             Shape::Sphere(sphere) => self.ellipsoid(*sphere, ray, hit),
+            Shape::Solid(solid) => self.piece(solid, ray, hit),
         }
     }
 
@@ -79,6 +81,41 @@ impl Placed<'_> {
             }
         };
         (point, surface)
+    }
+
+    fn piece(&self, solid: &Solid, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
+        let object = self.ray(ray);
+        let p = solid.project(hit.primitive, object.origin + hit.distance * object.stretch * object.direction);
+        let point = self.point(p);
+        let piece = solid.piece(hit.primitive, p);
+        let vector = self.covector(piece.gradient);
+        let length = vector.length();
+        if length == 0.0 {
+            let n_g = self.covector(solid.tip_normal(hit.primitive)).normalize();
+            return (point, LocalSurface { n_g, n_s: n_g, curvature: Curvature::Plane, field: NormalField::Flat });
+        }
+        let n_g = vector / length;
+        let quadric = |hessian: DMat3| {
+            // F(L⁻¹(q − t)) has the gradient L⁻ᵀ ∇F and the Hessian L⁻ᵀ H L⁻¹.
+            let gradient = self.inverse.transpose() * hessian * self.inverse;
+            (Curvature::Quadric { hessian: gradient * length.recip() }, NormalField::Linear { vector, gradient })
+        };
+        let (curvature, field) = match (piece.bend, self.similarity) {
+            (Bend::Plane, _) => (Curvature::Plane, NormalField::Flat),
+            (Bend::Sphere(s), Some(scale)) => {
+                let inv_radius = s / (scale * piece.gradient.length());
+                (Curvature::Sphere { inv_radius }, NormalField::Sphere { inv_radius })
+            }
+            (Bend::Sphere(s), None) => quadric(DMat3::from_diagonal(DVec3::splat(s))),
+            (Bend::Quadric(hessian), _) => quadric(hessian),
+            (Bend::Revolved { radial, around, second, third }, _) => {
+                let (radial, around) = (self.covector(radial), self.covector(around));
+                let gradient = outer(radial * second[0], radial) + outer(around * second[1], around);
+                let field = NormalField::Revolved { vector, radial, around, second, third };
+                (Curvature::Quadric { hessian: gradient * length.recip() }, field)
+            }
+        };
+        (point, LocalSurface { n_g, n_s: n_g, curvature, field })
     }
 }
 

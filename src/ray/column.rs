@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::scatter::{Scattering, scatter_first, scatter_second};
-use super::surface::{FlatNormals, LinearNormals, NormalField, Normals, SphereNormals};
+use super::surface::{FlatNormals, LinearNormals, NormalField, Normals, RevolvedNormals, SphereNormals};
 use super::transfer::{Segment, Transfer};
 use crate::optics::IorJet;
 
@@ -137,6 +137,9 @@ fn scatter_any<C: Scatter>(columns: &mut C, s: &Scattering) {
         NormalField::Sphere { inv_radius } => columns.scatter_with(s, &SphereNormals { inv_radius }),
         NormalField::Linear { vector, gradient } => {
             columns.scatter_with(s, &LinearNormals::new(s.normal, vector, gradient));
+        }
+        NormalField::Revolved { vector, radial, around, second, third } => {
+            columns.scatter_with(s, &RevolvedNormals::new(s.normal, vector, [radial, around], second, third));
         }
     }
 }

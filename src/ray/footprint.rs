@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::column::Column;
 use super::scatter::{ScatterKind, Scattering};
-use super::surface::{LinearNormals, NormalField, Normals};
+use super::surface::{LinearNormals, NormalField, Normals, RevolvedNormals};
 
 /// Accepted error of the first-order footprint, relative to its length.
 const TOLERANCE: f64 = 0.05;
@@ -22,6 +22,9 @@ pub fn critical_distance(s: &Scattering, col_lambda: &Column) -> f64 {
         NormalField::Sphere { inv_radius } => col_lambda.point * inv_radius,
         NormalField::Linear { vector, gradient } => {
             LinearNormals::new(s.normal, vector, gradient).first(col_lambda.point)
+        }
+        NormalField::Revolved { vector, radial, around, second, third } => {
+            RevolvedNormals::new(s.normal, vector, [radial, around], second, third).first(col_lambda.point)
         }
     };
     let dg = col_lambda.momentum.dot(s.normal) + s.momentum_in.dot(dnormal);

@@ -61,6 +61,21 @@ pub enum NormalField {
         /// ∂S/∂q: S' = `gradient`·q', S'' = `gradient`·q''.
         gradient: DMat3,
     },
+    /// N = S/|S| with S = ∇f of a surface of revolution: aspheres. With v = `radial`·q' and w = `around`·q',
+    /// S' = f_rr v `radial` + f_tt w `around`, and S'' has besides the same of q'' the term
+    /// (f_rrr v² + f_rtt w²) `radial` + 2 f_rtt v w `around`.
+    Revolved {
+        /// S at the point.
+        vector: DVec3,
+        /// Covector of the direction away from the axis.
+        radial: DVec3,
+        /// Covector of the direction around the axis.
+        around: DVec3,
+        /// f_rr and f_tt.
+        second: [f64; 2],
+        /// f_rrr and f_rtt.
+        third: [f64; 2],
+    },
 }
 
 impl NormalField {
@@ -71,6 +86,10 @@ impl NormalField {
             Self::Flat => Self::Flat,
             Self::Sphere { inv_radius } => Self::Sphere { inv_radius: -inv_radius },
             Self::Linear { vector, gradient } => Self::Linear { vector: -vector, gradient: -gradient },
+            Self::Revolved { vector, radial, around, second, third } => {
+                let negative = |[a, b]: [f64; 2]| [-a, -b];
+                Self::Revolved { vector: -vector, radial, around, second: negative(second), third: negative(third) }
+            }
         }
     }
 }
@@ -168,6 +187,47 @@ impl Normals for LinearNormals {
         let s2 = self.gradient * d2point;
         let l2 = self.length * dnormal.length_squared() + self.normal.dot(s2);
         (s2 - dnormal * (2.0 * l1) - self.normal * l2) * self.inv_length
+    }
+}
+
+pub(super) struct RevolvedNormals {
+    linear: LinearNormals,
+    radial: DVec3,
+    around: DVec3,
+    third: [f64; 2],
+}
+
+impl RevolvedNormals {
+    #[inline(always)]
+    pub(super) fn new(
+        normal: DVec3,
+        vector: DVec3,
+        [radial, around]: [DVec3; 2],
+        second: [f64; 2],
+        third: [f64; 2],
+    ) -> Self {
+        let outer = |u: DVec3, v: DVec3| DMat3::from_cols(u * v.x, u * v.y, u * v.z);
+        let gradient = outer(radial * second[0], radial) + outer(around * second[1], around);
+        Self { linear: LinearNormals::new(normal, vector, gradient), radial, around, third }
+    }
+}
+
+impl Normals for RevolvedNormals {
+    const FLAT: bool = false;
+
+    #[inline(always)]
+    fn first(&self, dpoint: DVec3) -> DVec3 {
+        self.linear.first(dpoint)
+    }
+
+    /// That of the linear field, and the part of S'' that is quadratic in q', projected like any S''.
+    #[inline(always)]
+    fn second(&self, dpoint: DVec3, dnormal: DVec3, d2point: DVec3) -> DVec3 {
+        let (v, w) = (self.radial.dot(dpoint), self.around.dot(dpoint));
+        let [rrr, rtt] = self.third;
+        let s2 = self.radial * (rrr * v * v + rtt * w * w) + self.around * (2.0 * rtt * v * w);
+        let normal = self.linear.normal;
+        self.linear.second(dpoint, dnormal, d2point) + (s2 - normal * normal.dot(s2)) * self.linear.inv_length
     }
 }
 

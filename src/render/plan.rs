@@ -339,6 +339,7 @@ fn is_smooth_glass(scene: &Scene, shape: &Shape, material_ids: &[u32]) -> bool {
     let is_glass = |id: &u32| id.checked_sub(1).is_some_and(|i| scene.materials[i as usize].has_interior());
     let is_smooth = match shape {
         Shape::Sphere(_) => true,
+        Shape::Solid(solid) => solid.is_curved(),
         Shape::Mesh(mesh) => mesh.has_normals(),
     };
     is_smooth && material_ids.iter().any(is_glass)

@@ -12,6 +12,7 @@ use super::description::{self, Array, Description, Document, Element};
 use super::manifest::Manifest;
 use super::material::{self, Context, Material, ScalarIor};
 use super::objects::{Object, ObjectArray, Objects, PartIds};
+use super::solids;
 use super::unroll::{self, Placed, Unrolled};
 use super::{Counts, Scene};
 use crate::diagnostics::Diagnostics;
@@ -173,18 +174,26 @@ fn build_shapes(
             shapes.push(None);
             continue;
         };
+        let Some(compiled) = compiled else {
+            diagnostics.warn("empty-shape", shape.path(), "a size is 0, so that nothing of it is seen: it is left out");
+            shapes.push(None);
+            continue;
+        };
         if let (description::Shape::Mesh(mesh), Some(report)) = (shape, &report) {
             report_mesh(mesh, report, diagnostics);
         }
         let report = match report {
-            None => ShapeReport { is_closed: true, open_edges: 0, triangles: 0, subsets: 0 },
+            None => {
+                let is_closed = !matches!(&*compiled, Shape::Solid(solid) if !solid.is_closed());
+                ShapeReport { is_closed, open_edges: if is_closed { 0 } else { 4 }, triangles: 0, subsets: 0 }
+            }
             Some(report) => ShapeReport {
                 is_closed: report.is_closed,
                 open_edges: report.open_edges as u64,
                 triangles: report.triangles as u64,
                 subsets: match shape {
                     description::Shape::Mesh(mesh) => mesh.subsets.len(),
-                    description::Shape::Sphere { .. } => 0,
+                    _ => 0,
                 },
             },
         };
@@ -206,13 +215,17 @@ fn report_mesh(mesh: &description::Mesh, report: &MeshReport, diagnostics: &mut 
     }
 }
 
-fn build_shape(description: &Description, shape: &description::Shape) -> Result<(Arc<Shape>, Option<MeshReport>)> {
+/// The shape, `None` if there is nothing of it; meshes with their report.
+fn build_shape(
+    description: &Description,
+    shape: &description::Shape,
+) -> Result<(Option<Arc<Shape>>, Option<MeshReport>)> {
     match shape {
         description::Shape::Sphere { path, radius } => {
             let sphere = Sphere::new(*radius).ok_or_else(|| {
                 Error::scene(format!("{path}.radius"), format!("is {radius}: it must be positive and finite"))
             })?;
-            Ok((Arc::new(Shape::Sphere(sphere)), None))
+            Ok((Some(Arc::new(Shape::Sphere(sphere))), None))
         }
         description::Shape::Mesh(mesh) => {
             let arrays = NamedArrays { description, place: &mesh.path };
@@ -236,8 +249,9 @@ fn build_shape(description: &Description, shape: &description::Shape) -> Result<
                 subsets: &subsets,
             };
             let (compiled, report) = Mesh::from_polygons(&polygons)?;
-            Ok((Arc::new(Shape::Mesh(compiled)), Some(report)))
+            Ok((Some(Arc::new(Shape::Mesh(compiled))), Some(report)))
         }
+        solid => Ok((solids::compile(solid)?.map(|solid| Arc::new(Shape::Solid(solid))), None)),
     }
 }
 

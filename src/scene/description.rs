@@ -95,8 +95,115 @@ pub enum Shape {
         /// Radius > 0.
         radius: f64,
     },
+    /// A cube about the origin.
+    Cube {
+        /// Prim path.
+        path: String,
+        /// Length of its edges.
+        size: f64,
+    },
+    /// A rectangle about the origin, facing along its axis.
+    Plane {
+        /// Prim path.
+        path: String,
+        /// Along x; along z for the axis X.
+        width: f64,
+        /// Along y; along z for the axis Y.
+        length: f64,
+        /// `X`, `Y` or `Z`.
+        axis: String,
+    },
+    /// A cylinder or truncated cone about the origin.
+    Cylinder {
+        /// Prim path.
+        path: String,
+        /// Along the axis.
+        height: f64,
+        /// At −height/2.
+        radius_bottom: f64,
+        /// At +height/2.
+        radius_top: f64,
+        /// `X`, `Y` or `Z`.
+        axis: String,
+    },
+    /// A cone about the origin, its tip towards +axis.
+    Cone {
+        /// Prim path.
+        path: String,
+        /// Along the axis.
+        height: f64,
+        /// Of the base.
+        radius: f64,
+        /// `X`, `Y` or `Z`.
+        axis: String,
+    },
+    /// A truncated cone about the origin that spheres continue without an edge at both ends.
+    Capsule {
+        /// Prim path.
+        path: String,
+        /// Along the axis, without what the spheres add.
+        height: f64,
+        /// Of the truncated cone at −height/2.
+        radius_bottom: f64,
+        /// Of the truncated cone at +height/2.
+        radius_top: f64,
+        /// `X`, `Y` or `Z`.
+        axis: String,
+    },
+    /// A lens element, traced as its prescription says.
+    Lens(Lens),
     /// A polygon mesh.
     Mesh(Mesh),
+}
+
+impl Shape {
+    /// Its prim path.
+    pub fn path(&self) -> &str {
+        match self {
+            Self::Sphere { path, .. }
+            | Self::Cube { path, .. }
+            | Self::Plane { path, .. }
+            | Self::Cylinder { path, .. }
+            | Self::Cone { path, .. }
+            | Self::Capsule { path, .. } => path,
+            Self::Lens(lens) => &lens.path,
+            Self::Mesh(mesh) => &mesh.path,
+        }
+    }
+}
+
+/// A lens element about the z axis: the front vertex at the origin, the back vertex at z = thickness.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lens {
+    /// Prim path.
+    pub path: String,
+    /// The face at the origin.
+    pub front: LensFace,
+    /// The face at z = thickness.
+    pub back: LensFace,
+    /// Between the vertices.
+    pub thickness: f64,
+    /// Of the cylinder that joins the faces; the larger semi-diameter if absent.
+    #[serde(default)]
+    pub edge_radius: Option<f64>,
+}
+
+/// One face of a lens.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LensFace {
+    /// 1/radius, positive if the centre is on the side of +z.
+    #[serde(default)]
+    pub curvature: f64,
+    /// The conic constant: 0 a sphere, −1 a paraboloid.
+    #[serde(default)]
+    pub conic: f64,
+    /// Coefficients of r⁴, r⁶, r⁸, ….
+    #[serde(default)]
+    pub aspheres: Vec<f64>,
+    /// Up to which the face has this form; beyond it is flat.
+    pub semi_diameter: f64,
 }
 
 /// A polygon mesh as authored.

@@ -9,6 +9,7 @@ pub mod file;
 mod manifest;
 pub mod material;
 mod objects;
+mod solids;
 mod unroll;
 pub mod view;
 

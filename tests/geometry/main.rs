@@ -4,4 +4,5 @@ mod departures;
 mod hits;
 mod meshes;
 mod shapes;
+mod solids;
 mod surfaces;

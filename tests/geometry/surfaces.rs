@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use abbe::geometry::{Aggregate, Buffer, Interpolation, Mesh, PrimvarView, Ray, Shape};
+use abbe::geometry::{Aggregate, Axis, Buffer, Interpolation, Mesh, PrimvarView, Ray, Revolved, Shape, Solid};
 use abbe::ray::{Curvature, LocalSurface, NormalField};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -31,6 +31,10 @@ fn predicted(surface: &LocalSurface, q: DVec3) -> (DVec3, f64) {
         NormalField::Sphere { inv_radius } => q * inv_radius,
         NormalField::Linear { vector, gradient } => {
             let s = gradient * q;
+            (s - surface.n_s * surface.n_s.dot(s)) / vector.length()
+        }
+        NormalField::Revolved { vector, radial, around, second, .. } => {
+            let s = radial * (second[0] * radial.dot(q)) + around * (second[1] * around.dot(q));
             (s - surface.n_s * surface.n_s.dot(s)) / vector.length()
         }
     };
@@ -75,6 +79,37 @@ fn spheres_and_ellipsoids_bend_as_they_say() {
         assert_eq!(matches!(surface.curvature, Curvature::Sphere { .. }), is_sphere);
         assert!(surface.n_g.dot(r.direction) < 0.0, "outward");
         check(&scene, &r, DVec3::new(0.05, -0.02, 0.03));
+    }
+}
+
+#[test]
+fn solids_bend_as_they_say() {
+    let solid = |revolved: Option<Revolved>| Arc::new(Shape::Solid(Solid::Revolved(revolved.expect("a solid"))));
+    for axis in [Axis::X, Axis::Y, Axis::Z] {
+        let shapes = [
+            solid(Revolved::cylinder(1.5, 0.8, 0.8, axis)),
+            solid(Revolved::cylinder(1.5, 0.9, 0.0, axis)),
+            solid(Revolved::cylinder(1.5, 0.4, 0.9, axis)),
+            solid(Revolved::capsule(0.5, 0.7, 0.7, axis)),
+            solid(Revolved::capsule(1.5, 0.9, 0.6, axis)),
+        ];
+        for shape in &shapes {
+            for place in [DAffine3::IDENTITY, DAffine3::from_scale(DVec3::splat(-0.3)), skew()] {
+                let scene = aggregate(&[placed(shape, place)]);
+                for (object, d) in [
+                    (DVec3::new(0.05, 0.02, 0.1), DVec3::new(3.0, 8.0, 1.0)),
+                    (DVec3::new(0.1, -0.03, 0.06), DVec3::new(-7.0, 1.0, 2.0)),
+                    (DVec3::new(0.02, 0.07, -0.05), DVec3::new(1.0, 2.0, 9.0)),
+                ] {
+                    let target = place.transform_point3(object);
+                    let d = place.transform_vector3(d);
+                    let r = ray(target - d, d);
+                    let (_, surface) = surface_at(&scene, &r);
+                    assert!(surface.n_g.dot(r.direction) < 0.0, "outward");
+                    check(&scene, &r, place.transform_vector3(DVec3::new(0.05, -0.02, 0.03)));
+                }
+            }
+        }
     }
 }
 

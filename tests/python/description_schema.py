@@ -14,6 +14,7 @@ SOURCE = Path(__file__).resolve().parents[2] / "src" / "scene" / "description.rs
 
 _BLOCK = re.compile(r"(?:pub )(struct|enum) (\w+) \{\n(.*?)\n\}", re.DOTALL)
 _FIELD = re.compile(r"(#\[serde\((?P<serde>[^\]]*)\)\]\s*)?pub (?P<name>\w+): (?P<type>[^\n]+),\n")
+_VARIANT = re.compile(r"(\w+) \{(.*?)\n    \},|(\w+)\((\w+)\),", re.DOTALL)
 _WARNING = {"kind": "String", "message": "String", "places": "Vec<String>", "count": "u64"}
 
 
@@ -30,7 +31,11 @@ def _load():
                 fields[key] = (key, match["type"], "default" in serde or match["type"].startswith("Option<"))
             structs[name] = fields
         elif name in ("Shape", "Target"):
-            enums[name] = body
+            enums[name] = {}
+            for variant, fields, tuple_variant, content in _VARIANT.findall(body):
+                key = (variant or tuple_variant).lower()
+                named = {field: kind for field, kind in re.findall(r"(\w+): ([^\n]+),", fields)}
+                enums[name][key] = content or named
     return structs, enums
 
 
@@ -75,12 +80,15 @@ def _check(value, type_name, where):
         _check_json(value, where)
     elif type_name == "Shape":
         assert isinstance(value, dict) and len(value) == 1, f"{where}: {value!r} is no shape"
-        if "mesh" in value:
-            _check(value["mesh"], "Mesh", f"{where}.mesh")
+        ((kind, content),) = value.items()
+        assert kind in _ENUMS["Shape"], f"{where}: {value!r}"
+        fields = _ENUMS["Shape"][kind]
+        if isinstance(fields, str):
+            _check(content, fields, f"{where}.{kind}")
         else:
-            assert set(value) == {"sphere"} and set(value["sphere"]) == {"path", "radius"}, f"{where}: {value!r}"
-            _check(value["sphere"]["path"], "String", where)
-            _check(value["sphere"]["radius"], "f64", where)
+            assert set(content) == set(fields), f"{where}: {value!r}"
+            for name, field_type in fields.items():
+                _check(content[name], field_type, f"{where}.{kind}.{name}")
     elif type_name == "Target":
         assert isinstance(value, dict) and len(value) == 1 and set(value) <= {"shape", "group"}, f"{where}: {value!r}"
         _check(next(iter(value.values())), "usize", where)

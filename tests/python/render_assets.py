@@ -14,9 +14,13 @@ import abbe  # Before USD opens anything.
 # ruff: isort: split
 from pxr import Gf, Usd, UsdGeom
 
+# Solids that are rendered; older versions of USD lack some.
+_NAMES = ("Sphere", "Cube", "Plane", "Cylinder", "Cylinder_1", "Cone", "Capsule", "Capsule_1")
+SOLIDS = tuple(getattr(UsdGeom, name) for name in _NAMES if hasattr(UsdGeom, name))
+
 
 def _bound(path: str) -> Any:
-    """The corners of a box around what is rendered, from points and transforms: authored extents may be wrong."""
+    """The corners of a box around what is rendered, from points, sizes, transforms: authored extents may be wrong."""
     stage = Usd.Stage.Open(path)
     start = stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else None
     time = Usd.TimeCode.EarliestTime() if start is None else Usd.TimeCode(start)
@@ -28,9 +32,8 @@ def _bound(path: str) -> Any:
             if points.ndim != 2 or not len(points):
                 continue
             extent = [points.min(axis=0), points.max(axis=0)]
-        elif prim.IsA(UsdGeom.Sphere):
-            radius = UsdGeom.Sphere(prim).GetRadiusAttr().Get(time)
-            extent = [[-radius] * 3, [radius] * 3]
+        elif any(prim.IsA(schema) for schema in SOLIDS):
+            extent = UsdGeom.Boundable.ComputeExtentFromPlugins(UsdGeom.Boundable(prim), time)
         else:
             continue
         world = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(time)

@@ -28,6 +28,9 @@ def _folder():
 
 
 FOLDER = _folder()
+# What is rendered; older versions of USD lack some.
+_NAMES = ("Mesh", "Sphere", "Cube", "Plane", "Cylinder", "Cylinder_1", "Cone", "Capsule", "Capsule_1")
+SCHEMAS = tuple(getattr(UsdGeom, name) for name in _NAMES if hasattr(UsdGeom, name))
 FILES = sorted(path for path in FOLDER.rglob("*") if path.suffix in EXTENSIONS) if FOLDER else []
 
 
@@ -63,7 +66,7 @@ def _agrees_with_usd(description, stage):
     for prim in iterator:
         if prim.IsA(UsdGeom.PointInstancer):
             iterator.PruneChildren()
-        if prim.IsA(UsdGeom.Mesh) or prim.IsA(UsdGeom.Sphere):
+        if any(prim.IsA(schema) for schema in SCHEMAS):
             imageable = UsdGeom.Imageable(prim)
             shown = imageable.ComputeVisibility(time) != "invisible" and imageable.ComputePurpose() in included
             if shown:

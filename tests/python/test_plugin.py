@@ -46,6 +46,21 @@ SCHEMAS = {
             "abbe:dielectricPriority": ("int", UNIFORM, 0, None),
         },
     ),
+    "AbbeLensAPI": (
+        "Mesh",
+        {
+            "abbe:lens:thickness": ("double", VARYING, 0.0, None),
+            "abbe:lens:edgeRadius": ("double", VARYING, 0.0, None),
+            "abbe:lens:front:curvature": ("double", VARYING, 0.0, None),
+            "abbe:lens:front:conic": ("double", VARYING, 0.0, None),
+            "abbe:lens:front:aspheres": ("double[]", UNIFORM, [], None),
+            "abbe:lens:front:semiDiameter": ("double", VARYING, 0.0, None),
+            "abbe:lens:back:curvature": ("double", VARYING, 0.0, None),
+            "abbe:lens:back:conic": ("double", VARYING, 0.0, None),
+            "abbe:lens:back:aspheres": ("double[]", UNIFORM, [], None),
+            "abbe:lens:back:semiDiameter": ("double", VARYING, 0.0, None),
+        },
+    ),
     "AbbeRenderSettingsAPI": (
         "RenderSettings",
         {
@@ -84,13 +99,13 @@ if len(sys.argv) > 1:
 stage = Usd.Stage.CreateInMemory()
 registry = Usd.SchemaRegistry()
 found = {}
-for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeRenderSettingsAPI", "RenderSettings"),
-                     ("AbbeRenderVarAPI", "RenderVar")):
+for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeLensAPI", "Mesh"),
+                     ("AbbeRenderSettingsAPI", "RenderSettings"), ("AbbeRenderVarAPI", "RenderVar")):
     definition = registry.FindAppliedAPIPrimDefinition(name)
     if definition is None:
         continue
     prim = stage.DefinePrim("/" + name, target)
-    wrong = stage.DefinePrim("/Wrong" + name, "Mesh")
+    wrong = stage.DefinePrim("/Wrong" + name, "Camera")
     properties = {}
     for key in definition.GetPropertyNames():
         attribute = definition.GetAttributeDefinition(key)

@@ -204,6 +204,7 @@ def test_unknown_glass(stage: Callable[..., Path]) -> None:
             "author it as inputs:abbe:dispersion:vd",
         ),
         ("mesh", 'uniform string abbe:glass = "ice"', "/World/Cube.abbe:glass", "author it on a Material"),
+        ("mesh", "double abbe:lens:thicknes = 1", "/World/Cube.abbe:lens:thicknes", "is abbe:lens:thickness meant?"),
         ("settings", "int abbe:sample = 4", "/Settings.abbe:sample", "is abbe:samples meant?"),
         ("settings", "double abbe:wavelength = 500", "/Settings.abbe:wavelength", "author it on a RenderVar"),
     ],

@@ -124,6 +124,13 @@ impl Stagehand {
         self.place(path, transform, material);
     }
 
+    /// A shape that needs no arrays.
+    pub fn solid(&mut self, shape: Shape, transform: DMat4, material: Option<usize>) {
+        let path = shape.path().to_owned();
+        self.document.shapes.push(shape);
+        self.place(&path, transform, material);
+    }
+
     /// A polygon mesh, right-handed: counter-clockwise from outside.
     pub fn mesh(
         &mut self,

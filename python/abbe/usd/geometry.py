@@ -1,4 +1,4 @@
-"""Meshes and spheres: from prims to the shapes of the description, arrays as USD holds them.
+"""Meshes, spheres and other solids: from prims to the shapes of the description, arrays as USD holds them.
 
 What the arrays say is checked by the core; here only their types are, since USD lets a ``point3f[]`` attribute hold an
 ``int``. A shape that several instances share is read once.
@@ -16,6 +16,8 @@ from ..errors import StageError
 from . import tokens
 from ._pxr import Usd, UsdGeom
 from .description import Array, ArrayTable, Diagnostics
+from .lenses import lens_bounds, read_lens
+from .solids import read_solid, solid_bounds
 from .values import float_array, int_array, place, read
 
 __all__ = ["ShapeReader"]
@@ -52,6 +54,14 @@ class ShapeReader:
         """Return the index of the shape of a ``Sphere`` prim; prims with one ``source`` share it."""
         return self._shared(prim, source, self._read_sphere)
 
+    def solid(self, prim: Any, source: Any) -> int | None:
+        """Return the index of the shape of a cube, plane, cylinder, cone or capsule."""
+        return self._shared(prim, source, lambda prim: read_solid(prim, self._time))
+
+    def lens(self, prim: Any, source: Any) -> int | None:
+        """Return the index of the shape of a prim with a lens prescription."""
+        return self._shared(prim, source, lambda prim: read_lens(prim, self._time))
+
     def mesh(self, prim: Any, source: Any) -> int | None:
         """Return the index of the shape of a ``Mesh`` prim; None (with a warning) if it has nothing to render."""
         return self._shared(prim, source, self._read_mesh)
@@ -62,6 +72,9 @@ class ShapeReader:
         if sphere is not None:
             radius = abs(sphere["radius"])
             return (-radius, -radius, -radius), (radius, radius, radius)
+        solid = solid_bounds(self.shapes[shape]) or lens_bounds(self.shapes[shape])
+        if solid is not None:
+            return solid
         points = self.arrays[self.shapes[shape]["mesh"]["points"]]
         bounds = _extent(points)
         if not all(math.isfinite(value) for corner in bounds for value in corner):

@@ -21,8 +21,10 @@ from .cameras import find_camera, framed_camera, read_camera
 from .description import Array, ArrayTable, Description, Diagnostics
 from .geometry import ShapeReader
 from .instancers import InstancerReader
+from .lenses import is_lens
 from .materials import MaterialReader
 from .render import find_settings, read_settings, token_list
+from .solids import solid_kind
 from .stage import (
     OpenedStage,
     Opening,
@@ -46,6 +48,8 @@ class _Kind(enum.Enum):
 
     MESH = enum.auto()
     SPHERE = enum.auto()
+    SOLID = enum.auto()
+    LENS = enum.auto()
     CAMERA = enum.auto()
     LIGHT = enum.auto()
     UNSUPPORTED = enum.auto()
@@ -62,6 +66,8 @@ def _classify(prim: Any) -> _Kind:
         return _Kind.MESH
     if prim.IsA(UsdGeom.Sphere):
         return _Kind.SPHERE
+    if solid_kind(prim) is not None:
+        return _Kind.SOLID
     if prim.IsA(UsdGeom.Camera):
         return _Kind.CAMERA
     if prim.HasAPI(UsdLux.LightAPI) or any(prim.IsA(base) for base in _light_schemas()):
@@ -172,6 +178,9 @@ class _Walk:
                 continue
             state = self._inherit(prim, facts, parent)
             states.append(state)
+            if kind is _Kind.LENS:
+                # What stands below is what other software draws in its place.
+                prims.PruneChildren()
             if kind is _Kind.INSTANCER:
                 # Its prototypes usually stand below it and are not drawn where they stand.
                 prims.PruneChildren()
@@ -260,6 +269,8 @@ class _Walk:
         kind = self._kinds.get(type_name)
         if kind is None:
             kind = self._kinds[type_name] = _classify(prim)
+        if kind in (_Kind.MESH, _Kind.PASS_THROUGH) and is_lens(prim):
+            kind = _Kind.LENS
         attribute = prim.GetAttribute(tokens.PURPOSE)
         authored = bool(attribute) and attribute.HasAuthoredValue()
         return _Facts(
@@ -299,6 +310,10 @@ class _Walk:
             self._place(prim, path, self.shapes.mesh(prim, source), state, group)
         elif kind is _Kind.SPHERE:
             self._place(prim, path, self.shapes.sphere(prim, source), state, group)
+        elif kind is _Kind.LENS:
+            self._place(prim, path, self.shapes.lens(prim, source), state, group)
+        elif kind is _Kind.SOLID:
+            self._place(prim, path, self.shapes.solid(prim, source), state, group)
         elif kind is _Kind.SKELETAL:
             self.diagnostics.warn(
                 "unsupported-prim", place(prim), "skinning is not supported; meshes below are rendered as authored"
@@ -475,7 +490,7 @@ def _read(
     )
     _warn_of_motion(walk.instancers.moving, cameras, settings, diagnostics)
     if not any(group["items"] for group in groups):
-        diagnostics.warn("nothing-to-render", source, "the stage has no mesh or sphere to render: every ray misses")
+        diagnostics.warn("nothing-to-render", source, "the stage has no geometry to render: every ray misses")
 
     document = {
         "format": FORMAT,

@@ -41,8 +41,16 @@ SCALES: Final = "scales"
 IDS: Final = "ids"
 MOTION_NAMES: Final = ("velocities", "accelerations", "angularVelocities")
 
-# Sphere.
+# Sphere, Cube, Plane, Cylinder, Cone, Capsule.
 RADIUS: Final = "radius"
+RADIUS_BOTTOM: Final = "radiusBottom"
+RADIUS_TOP: Final = "radiusTop"
+HEIGHT: Final = "height"
+WIDTH: Final = "width"
+LENGTH: Final = "length"
+SIZE: Final = "size"
+AXIS: Final = "axis"
+AXES: Final = ("X", "Y", "Z")
 
 # Mesh.
 POINTS: Final = "points"
@@ -193,6 +201,21 @@ MATERIAL_NAMES: Final = {
     "abbe:internalTransmittance:thickness": "double",
     "abbe:dielectricPriority": "int",
 }
+LENS_THICKNESS: Final = "abbe:lens:thickness"
+LENS_EDGE_RADIUS: Final = "abbe:lens:edgeRadius"
+LENS_PREFIX: Final = "abbe:lens:"
+LENS_NAMES: Final = {
+    "abbe:lens:thickness": "double",
+    "abbe:lens:edgeRadius": "double",
+    "abbe:lens:front:curvature": "double",
+    "abbe:lens:front:conic": "double",
+    "abbe:lens:front:aspheres": "double[]",
+    "abbe:lens:front:semiDiameter": "double",
+    "abbe:lens:back:curvature": "double",
+    "abbe:lens:back:conic": "double",
+    "abbe:lens:back:aspheres": "double[]",
+    "abbe:lens:back:semiDiameter": "double",
+}
 SCALAR_IOR: Final = "abbe:scalarIor"
 SETTINGS_NAMES: Final = {
     "abbe:integrator": "token",
@@ -215,4 +238,10 @@ VAR_NAMES: Final = {
     "abbe:spectral:band": "double2",
     "abbe:spectral:binWidth": "double",
 }
-OUR_SCHEMAS: Final = {"Material": MATERIAL_NAMES, RENDER_SETTINGS: SETTINGS_NAMES, RENDER_VAR: VAR_NAMES}
+OUR_SCHEMAS: Final = {
+    "Material": MATERIAL_NAMES,
+    "Mesh": LENS_NAMES,
+    "Xform": LENS_NAMES,
+    RENDER_SETTINGS: SETTINGS_NAMES,
+    RENDER_VAR: VAR_NAMES,
+}
