@@ -11,15 +11,18 @@ from typing import Any
 
 from ..errors import StageError
 from . import tokens
+from ._pxr import UsdGeom
 from .values import place, read
 
 __all__ = ["is_lens", "lens_bounds", "read_lens"]
 
 
 def is_lens(prim: Any) -> bool:
-    """Return whether a prim has a prescription: its thickness is authored."""
+    """Return whether a prim is a Mesh or an Xform with a prescription: its thickness is authored."""
     attribute = prim.GetAttribute(tokens.LENS_THICKNESS)
-    return bool(attribute) and attribute.HasAuthoredValue()
+    if not attribute or not attribute.HasAuthoredValue():
+        return False
+    return bool(prim.IsA(UsdGeom.Mesh) or prim.IsA(UsdGeom.Xform))
 
 
 def read_lens(prim: Any, time: Any) -> dict[str, Any]:
