@@ -168,7 +168,7 @@ fn lenses_and_solids_of_an_array_are_those_placed_one_by_one() {
         assert_eq!(array_view.is_in_contact(&hit), plain_view.is_in_contact(&hit));
         let path = array.prims.path(array.objects.ids(hit.instance).prim_id).unwrap();
         if path.ends_with("/Crown") || path.ends_with("/Flint") {
-            assert!(array_view.is_touching(&hit) && array_view.is_in_contact(&hit));
+            assert!(array_view.is_touching(&hit));
             elements += 1;
         }
     }
