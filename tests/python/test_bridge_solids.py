@@ -61,6 +61,8 @@ def test_fallbacks_are_usds(name):
 @pytest.mark.parametrize("axis", ["X", "Y", "Z"])
 @pytest.mark.parametrize("name", available())
 def test_bounds_are_those_that_usd_computes(name, axis):
+    if name == "Capsule_1" and Usd.GetVersion() < (0, 26, 5):
+        pytest.skip("USD 24.8 was seen to compute other bounds of a Capsule_1 than 26.11")
     stage = Usd.Stage.CreateInMemory()
     prim = define(stage, "/S", name, SIZES[name], axis)
     xform = UsdGeom.XformCommonAPI(prim)
