@@ -46,7 +46,7 @@ def permittivity(number: int, c: list[mpf], x: mpf) -> mpf:
         return (1 + c[0] + sum((b / (d - x**-2) for b, d in pairs), mpf(0))) ** 2
     if number == 9:
         return c[0] + c[1] / (x**2 - c[2]) + c[3] * (x - c[4]) / ((x - c[4]) ** 2 + c[5])
-    raise NotImplementedError(f"formula {number}")
+    raise ValueError(f"an entry of the catalogue has formula {number}, which this oracle has to state too")
 
 
 def exact(glass: Glass, nm: float) -> tuple[mpf, mpf, mpf]:
