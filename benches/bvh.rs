@@ -52,6 +52,7 @@ fn mesh(points: &Buffer<[f32; 3]>, counts: &[i32], indices: &[i32]) -> Mesh {
         normals: None,
         uv: None,
         subsets: &[],
+        subdivision: None,
     };
     Mesh::from_polygons(&polygons).expect("a ball").0
 }

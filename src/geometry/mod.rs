@@ -24,6 +24,7 @@ mod revolved;
 mod solid;
 mod sphere;
 mod start;
+mod subdivision;
 mod surface;
 mod topology;
 mod tree;
@@ -38,12 +39,15 @@ pub use cuboid::{Cuboid, Rectangle};
 pub use departures::Departures;
 pub(crate) use instances::affine;
 pub use instances::{Instance, InstanceArray, Location, Numbering, Part};
-pub use mesh::{Mesh, MeshReport};
+pub use mesh::{Mesh, MeshProblem, MeshReport};
 pub(crate) use placed::is_invertible;
 pub use polygons::{Interpolation, PolygonMesh, PrimvarView};
 pub use revolved::{Cap, Revolved};
 pub use solid::{Axis, Solid};
 pub use sphere::Sphere;
+pub use subdivision::{
+    BoundaryInterpolation, FaceVaryingInterpolation, MAX_TRIANGLES, Scheme, Subdivision, TriangleRule,
+};
 
 /// A ray in render space.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -247,6 +247,7 @@ fn build_shape(
                 normals: mesh.normals.as_ref().map(|p| arrays.primvar(p, 3)).transpose()?,
                 uv: mesh.uv.as_ref().map(|p| arrays.primvar(p, 2)).transpose()?,
                 subsets: &subsets,
+                subdivision: None,
             };
             let (compiled, report) = Mesh::from_polygons(&polygons)?;
             Ok((Some(Arc::new(Shape::Mesh(compiled))), Some(report)))

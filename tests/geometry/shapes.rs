@@ -17,6 +17,7 @@ pub(crate) fn polygons<'a>(points: &[[f32; 3]], counts: &'a [i32], indices: &'a 
         normals: None,
         uv: None,
         subsets: &[],
+        subdivision: None,
     }
 }
 
