@@ -170,14 +170,23 @@ fn build_shapes(
         .collect();
     let mut shapes = Vec::with_capacity(built.len());
     for (shape, result) in description.document.shapes.iter().zip(built) {
-        let Some((compiled, report)) = result? else {
+        let Some(built) = result? else {
             shapes.push(None);
             continue;
         };
-        let Some(compiled) = compiled else {
-            diagnostics.warn("empty-shape", shape.path(), "a size is 0, so that nothing of it is seen: it is left out");
-            shapes.push(None);
-            continue;
+        let (compiled, report) = match built {
+            Built::Shape(compiled, report) => (compiled, report),
+            Built::Nothing => {
+                let problem = "a size is 0, so that nothing of it is seen: it is left out";
+                diagnostics.warn("empty-shape", shape.path(), problem);
+                shapes.push(None);
+                continue;
+            }
+            Built::Broken { place, problem } => {
+                diagnostics.warn("broken-shape", place, format!("{problem}; the shape is left out"));
+                shapes.push(None);
+                continue;
+            }
         };
         if let (description::Shape::Mesh(mesh), Some(report)) = (shape, &report) {
             report_mesh(mesh, report, diagnostics);
@@ -215,18 +224,34 @@ fn report_mesh(mesh: &description::Mesh, report: &MeshReport, diagnostics: &mut 
     }
 }
 
-/// The shape, `None` if there is nothing of it; meshes with their report.
-fn build_shape(
-    description: &Description,
-    shape: &description::Shape,
-) -> Result<(Option<Arc<Shape>>, Option<MeshReport>)> {
+/// What became of a shape.
+enum Built {
+    /// Meshes have a report.
+    Shape(Arc<Shape>, Option<MeshReport>),
+    /// A size is 0.
+    Nothing,
+    /// What the stage says of it is no shape. It is left out, and the rest of the picture kept.
+    Broken { place: String, problem: String },
+}
+
+/// Compiles a shape. What the stage got wrong is no error but [`Built::Broken`]; arrays that the document names and the
+/// description lacks are damage to the description itself, and an error.
+fn build_shape(description: &Description, shape: &description::Shape) -> Result<Built> {
+    match compile_shape(description, shape)? {
+        Ok(built) => Ok(built),
+        Err(Error::Scene { place, problem }) => Ok(Built::Broken { place, problem }),
+        Err(other) => Err(other),
+    }
+}
+
+/// The outer error is the description's, the inner the stage's.
+fn compile_shape(description: &Description, shape: &description::Shape) -> Result<Result<Built>> {
+    let solid = |shape: Option<Shape>| shape.map_or(Built::Nothing, |shape| Built::Shape(Arc::new(shape), None));
     match shape {
-        description::Shape::Sphere { path, radius } => {
-            let sphere = Sphere::new(*radius).ok_or_else(|| {
-                Error::scene(format!("{path}.radius"), format!("is {radius}: it must be positive and finite"))
-            })?;
-            Ok((Some(Arc::new(Shape::Sphere(sphere))), None))
-        }
+        description::Shape::Sphere { radius: 0.0, .. } => Ok(Ok(Built::Nothing)),
+        description::Shape::Sphere { path, radius } => Ok(Sphere::new(*radius)
+            .map(|sphere| solid(Some(Shape::Sphere(sphere))))
+            .ok_or_else(|| Error::scene(format!("{path}.radius"), format!("is {radius}: it must be positive and finite")))),
         description::Shape::Mesh(mesh) => {
             let arrays = NamedArrays { description, place: &mesh.path };
             let hole_indices = mesh.hole_indices.as_deref().map(|name| arrays.integers(name)).transpose()?;
@@ -248,10 +273,10 @@ fn build_shape(
                 uv: mesh.uv.as_ref().map(|p| arrays.primvar(p, 2)).transpose()?,
                 subsets: &subsets,
             };
-            let (compiled, report) = Mesh::from_polygons(&polygons)?;
-            Ok((Some(Arc::new(Shape::Mesh(compiled))), Some(report)))
+            let mesh = Mesh::from_polygons(&polygons);
+            Ok(mesh.map(|(mesh, report)| Built::Shape(Arc::new(Shape::Mesh(mesh)), Some(report))))
         }
-        solid => Ok((solids::compile(solid)?.map(|solid| Arc::new(Shape::Solid(solid))), None)),
+        other => Ok(solids::compile(other).map(|compiled| solid(compiled.map(Shape::Solid)))),
     }
 }
 

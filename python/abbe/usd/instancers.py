@@ -12,10 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import StageError
 from . import tokens
 from ._pxr import UsdGeom
-from .description import Array, ArrayTable, Diagnostics
+from .description import Array, ArrayTable, BrokenError, Diagnostics
 from .values import int_array, is_finite, matrix, place, read
 
 __all__ = ["Elements", "InstancerReader"]
@@ -173,7 +172,11 @@ class InstancerReader:
         for index, target in targets.items():
             chosen = shown.elements[index]
             rows = transforms[..., :3] if chosen is None else transforms[chosen, :, :3]
-            own = self._own_transform(prim.GetStage().GetPrimAtPath(target))
+            try:
+                own = self._own_transform(prim.GetStage().GetPrimAtPath(target))
+            except BrokenError as broken:
+                self._diagnostics.leave_out(broken)
+                continue
             if own is not None:
                 with np.errstate(over="ignore", invalid="ignore"):  # the core leaves out what is not finite
                     rows = own @ rows
@@ -189,9 +192,9 @@ class InstancerReader:
         numbers = matrix(xformable.GetLocalTransformation(self._time))
         own = np.array(numbers).reshape(4, 4)
         if not is_finite(numbers):
-            raise StageError(f"{place(root)}: its transform is not finite: correct its xformOps")
+            raise BrokenError(place(root), "its transform is not finite, so that its instances stand nowhere")
         if (own[:, 3] != (0.0, 0.0, 0.0, 1.0)).any():
-            raise StageError(f"{place(root)}: its transform is projective: only affine transforms place geometry")
+            raise BrokenError(place(root), "its transform is projective: only affine transforms place geometry")
         return None if (own == np.eye(4)).all() else own
 
 

@@ -19,7 +19,7 @@ from . import tokens
 from ._pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 from .cameras import find_camera, framed_camera, read_camera
 from .composition import composition_warnings, quiet_usd
-from .description import Array, ArrayTable, Description, Diagnostics
+from .description import Array, ArrayTable, BrokenError, Description, Diagnostics
 from .geometry import ShapeReader
 from .instancers import InstancerReader
 from .lenses import is_lens
@@ -177,11 +177,15 @@ class _Walk:
             if kind is _Kind.INSTANCER:
                 # Its prototypes usually stand below it and are not drawn where they stand.
                 prims.PruneChildren()
-                self._instance(prim, source or prim, str(path), state, group)
-            elif kind is not _Kind.PASS_THROUGH:
-                self._visit(prim, source or prim, str(path), kind, state, group)
-            elif prim.IsModel():
-                self._check_draw_mode(prim, state)
+            try:
+                if kind is _Kind.INSTANCER:
+                    self._instance(prim, source or prim, str(path), state, group)
+                elif kind is not _Kind.PASS_THROUGH:
+                    self._visit(prim, source or prim, str(path), kind, state, group)
+                elif prim.IsModel():
+                    self._check_draw_mode(prim, state)
+            except BrokenError as broken:
+                self.diagnostics.leave_out(broken)
 
     def _instance(self, prim: Any, source: Any, path: str, state: _State, group: _Group) -> None:
         """Add what a point instancer shows to ``group``."""
@@ -223,17 +227,17 @@ class _Walk:
         index = self._group_by_prototype.get(key)
         if index is None:
             if len(self._open) == _MAX_NESTING:
-                raise StageError(
-                    f"{place(instancer)}: is nested in {_MAX_NESTING} others: instance what they come to, or bake it"
-                )
+                raise BrokenError(place(instancer), f"is nested in {_MAX_NESTING} others, which is too deep")
             index = self._group_by_prototype[key] = len(self.groups)
             group = _Group(str(root.GetPath()), root)
             self.groups.append(group)
             self._open.append(root)
             prims = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
             depth = root.GetPath().pathElementCount - 1
-            self._traverse(prims, prims, _State(True, purpose, None), depth, group)
-            self._open.pop()
+            try:
+                self._traverse(prims, prims, _State(True, purpose, None), depth, group)
+            finally:
+                self._open.pop()
         return index
 
     def _purpose_above(self, prim: Any) -> str | None:
@@ -254,7 +258,7 @@ class _Walk:
             relative, _ = self.transforms.ComputeRelativeTransform(prim, group.root)
             transform = matrix(relative)
         if not is_finite(transform):
-            raise StageError(f"{place(prim)}: its transform is not finite: correct its xformOps or its parents'")
+            raise BrokenError(place(prim), "its transform is not finite, so that it stands nowhere")
         return transform
 
     def _facts(self, prim: Any) -> _Facts:
