@@ -249,9 +249,11 @@ fn compile_shape(description: &Description, shape: &description::Shape) -> Resul
     let solid = |shape: Option<Shape>| shape.map_or(Built::Nothing, |shape| Built::Shape(Arc::new(shape), None));
     match shape {
         description::Shape::Sphere { radius: 0.0, .. } => Ok(Ok(Built::Nothing)),
-        description::Shape::Sphere { path, radius } => Ok(Sphere::new(*radius)
-            .map(|sphere| solid(Some(Shape::Sphere(sphere))))
-            .ok_or_else(|| Error::scene(format!("{path}.radius"), format!("is {radius}: it must be positive and finite")))),
+        description::Shape::Sphere { path, radius } => {
+            Ok(Sphere::new(*radius).map(|sphere| solid(Some(Shape::Sphere(sphere)))).ok_or_else(|| {
+                Error::scene(format!("{path}.radius"), format!("is {radius}: it must be positive and finite"))
+            }))
+        }
         description::Shape::Mesh(mesh) => {
             let arrays = NamedArrays { description, place: &mesh.path };
             let hole_indices = mesh.hole_indices.as_deref().map(|name| arrays.integers(name)).transpose()?;

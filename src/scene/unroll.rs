@@ -253,7 +253,9 @@ fn flatten<'a>(
     while let Some(mut frame) = stack.pop() {
         let Some(item) = document.groups[frame.group].items.get(frame.next) else {
             for (i, instances) in document.groups[frame.group].instances.iter().enumerate() {
-                let Some(local) = place_of(instances.transform.as_ref(), &instances.path, diagnostics) else { continue };
+                let Some(local) = place_of(instances.transform.as_ref(), &instances.path, diagnostics) else {
+                    continue;
+                };
                 nested.push(Nested { key: (frame.group, i), instances, transform: frame.transform * local });
             }
             continue;

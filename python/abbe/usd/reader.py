@@ -120,6 +120,8 @@ class _Group:
     instances: list[dict[str, Any]] = field(default_factory=list)
 
 
+# The last column of an affine matrix.
+_AFFINE = [0.0, 0.0, 0.0, 1.0]
 # Deeper nesting of instancers than this nobody models, and Python's own stack would end soon after.
 _MAX_NESTING = 64
 
@@ -259,6 +261,8 @@ class _Walk:
             transform = matrix(relative)
         if not is_finite(transform):
             raise BrokenError(place(prim), "its transform is not finite, so that it stands nowhere")
+        if transform[3::4] != _AFFINE:
+            raise BrokenError(place(prim), "its transform is projective, and only affine ones place geometry")
         return transform
 
     def _facts(self, prim: Any) -> _Facts:
