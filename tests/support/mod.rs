@@ -50,6 +50,8 @@ impl Stagehand {
             settings: Settings::default(),
             warnings: Default::default(),
             skipped: BTreeMap::new(),
+            textures: Vec::new(),
+            strict_assets: false,
         };
         Self { document, arrays: Arrays::new() }
     }
