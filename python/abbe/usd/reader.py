@@ -19,23 +19,16 @@ from . import tokens
 from ._pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 from .assets import AssetReader
 from .cameras import find_camera, framed_camera, read_camera
+from .composition import composition_warnings, quiet_usd
 from .description import Array, ArrayTable, Description, Diagnostics
 from .geometry import ShapeReader
 from .instancers import InstancerReader
 from .lenses import is_lens
 from .materials import MaterialReader
+from .metadata import stage_metadata, stage_time
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
-from .stage import (
-    OpenedStage,
-    Opening,
-    composition_warnings,
-    open_stage,
-    quiet_usd,
-    source_name,
-    stage_metadata,
-    stage_time,
-)
+from .stage import OpenedStage, Opening, open_stage, source_name
 from .values import IDENTITY, is_finite, matrix, place, read
 
 __all__ = ["default_camera", "read_stage"]
