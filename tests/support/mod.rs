@@ -158,6 +158,8 @@ impl Stagehand {
             left_handed: false,
             normals: None,
             uv: None,
+            uv_name: None,
+            primvars: BTreeMap::new(),
             subsets: vec![],
         }));
         self.place(path, transform, material);
@@ -182,6 +184,7 @@ impl Stagehand {
             instance: None,
             material,
             subset_materials: vec![],
+            primvars: Default::default(),
             double_sided: false,
         });
     }
