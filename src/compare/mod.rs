@@ -19,6 +19,7 @@ use crate::ray::{
     second_order_along,
 };
 use crate::render::Plan;
+use crate::sampler::CameraSample;
 use crate::scene::Scene;
 use crate::scene::view::{Media, View};
 use crate::spectrum::Wavelength;
@@ -108,7 +109,7 @@ pub fn compare(scene: &Scene, plan: &Plan, rounds: usize) -> Result<Comparison> 
     let window = plan.window;
     let starts: Vec<RayStart> = (window.y0..window.y1)
         .flat_map(|y| (window.x0..window.x1).map(move |x| (x, y)))
-        .map(|(x, y)| camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5))
+        .map(|(x, y)| camera.ray(&CameraSample::at(f64::from(x) + 0.5, f64::from(y) + 0.5)))
         .collect();
     let rounds = rounds.max(1);
     let costs = costs(&tracer, nm, &starts, rounds)?;
