@@ -53,7 +53,7 @@ pub fn build(description: Description) -> Result<Scene> {
             None => 0,
             Some(path) => instances.id(path, 1).ok_or_else(|| too_many(path))?,
         };
-        objects.push(Object { shape, world_from_object: single.transform, prim_id, instance_id, material_ids });
+        objects.push(Object { shape, world_from_object: single.transform.into(), prim_id, instance_id, material_ids });
     }
     let prototypes = prototypes
         .iter()
@@ -61,7 +61,7 @@ pub fn build(description: Description) -> Result<Scene> {
             let (mut parts, mut ids) = (Vec::new(), Vec::new());
             for part in placed {
                 let Some((shape, part_ids)) = compiler.part(part, &mut diagnostics)? else { continue };
-                parts.push(Part { shape, place_from_object: part.transform });
+                parts.push(Part { shape, place_from_object: part.transform.into() });
                 ids.push(part_ids);
             }
             Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids)))
@@ -69,8 +69,12 @@ pub fn build(description: Description) -> Result<Scene> {
         .collect::<Result<Vec<_>>>()?;
     let arrays = arrays.into_iter().filter_map(|array| {
         let (parts, ids) = &prototypes[array.prototype];
-        let instances =
-            InstanceArray { parts: Arc::clone(parts), places: array.places, world_from_array: array.transform };
+        let instances = InstanceArray {
+            parts: Arc::clone(parts),
+            places: array.places,
+            motion: None,
+            world_from_array: array.transform.into(),
+        };
         let parts = Arc::clone(ids);
         let placed = ObjectArray { instances, parts, first_id: array.first_id, indices: array.indices };
         (!placed.instances.is_empty()).then_some(placed)
