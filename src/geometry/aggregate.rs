@@ -295,6 +295,14 @@ impl Aggregate {
         }
     }
 
+    /// The primvar with a number at a hit; `None` where the shape has none (always, for analytic shapes).
+    pub fn primvar(&self, hit: &Hit, number: usize) -> Option<[f32; 4]> {
+        match self.shape(hit.instance) {
+            Shape::Sphere(_) | Shape::Solid(_) => None,
+            Shape::Mesh(mesh) => mesh.primvar(number, hit.primitive, hit.barycentric),
+        }
+    }
+
     /// The material slot that was hit: 0 for faces in no subset, k + 1 for the k-th subset.
     pub fn slot(&self, hit: &Hit) -> u32 {
         match self.shape(hit.instance) {

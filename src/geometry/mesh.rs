@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::Buffer;
 use super::motion::{Between, Deformation, Deformed};
-use super::polygons::{Interpolation, PolygonMesh, PrimvarView};
+use super::polygons::{Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
 use super::start::{Start, behind};
 use super::topology;
 use super::tree::{Bounds, Tree};
@@ -28,6 +28,9 @@ pub struct Mesh {
     normals: Option<CornerValues>,
     normals_reversed: bool,
     uv: Option<CornerValues>,
+    uv_number: Option<usize>,
+    /// By the number that they are looked up by, with the floats in a value.
+    primvars: Vec<Option<(usize, CornerValues)>>,
     slots: Option<Vec<u16>>,
     tree: Tree,
     bounds: Bounds,
@@ -69,11 +72,23 @@ impl CornerValues {
 
     /// The same of other values in the same order.
     fn among<const N: usize>(&self, values: &[f32], triangle: [u32; 3], primitive: u32) -> [[f32; N]; 3] {
-        let indices = self.indices.as_ref().map_or(triangle, |indices| indices[primitive as usize]);
-        indices.map(|i| {
+        self.corners(triangle, primitive).map(|i| {
             let first = i as usize * N;
             std::array::from_fn(|k| values[first + k])
         })
+    }
+
+    /// Values of `columns` floats, up to four; the others are 0.
+    fn padded(&self, columns: usize, triangle: [u32; 3], primitive: u32) -> [[f32; 4]; 3] {
+        self.corners(triangle, primitive).map(|i| {
+            let mut value = [0.0; 4];
+            value[..columns].copy_from_slice(&self.values[i as usize * columns..][..columns]);
+            value
+        })
+    }
+
+    fn corners(&self, triangle: [u32; 3], primitive: u32) -> [u32; 3] {
+        self.indices.as_ref().map_or(triangle, |indices| indices[primitive as usize])
     }
 }
 
@@ -106,6 +121,9 @@ impl Mesh {
                 polygons.check_primvar(name, primvar, width)?;
             }
         }
+        for NamedPrimvar { name, columns, view } in polygons.primvars.iter().flatten() {
+            polygons.check_primvar(&format!("primvars:{name}"), view, *columns)?;
+        }
         let mut report =
             MeshReport { short_faces: polygons.counts.iter().filter(|&&n| n < 3).count(), ..MeshReport::default() };
         let face_slots = face_slots(polygons, &mut report);
@@ -114,6 +132,8 @@ impl Mesh {
         let mut slots = face_slots.as_ref().map(|_| Vec::new());
         let mut normals = polygons.normals.as_ref().map(Collector::new);
         let mut uv = polygons.uv.as_ref().map(Collector::new);
+        let mut primvars: Vec<_> =
+            polygons.primvars.iter().map(|named| Some(Collector::new(&named.as_ref()?.view))).collect();
         polygons.triangulate(|face, corners| {
             let moved = deformation.iter().flat_map(|d| &d.points);
             let points = moved.map(|points| corners.map(|corner| widen(points[polygons.indices[corner] as usize])));
@@ -125,7 +145,7 @@ impl Mesh {
             if let (Some(slots), Some(face_slots)) = (&mut slots, &face_slots) {
                 slots.push(face_slots[face]);
             }
-            for values in [&mut normals, &mut uv].into_iter().flatten() {
+            for values in [&mut normals, &mut uv].into_iter().chain(&mut primvars).flatten() {
                 values.push(face, corners, polygons.indices);
             }
         });
@@ -150,6 +170,10 @@ impl Mesh {
             normals: normals.map(Collector::finish),
             normals_reversed: false,
             uv: uv.map(Collector::finish),
+            uv_number: polygons.uv_number,
+            primvars: (polygons.primvars.iter().zip(primvars))
+                .map(|(named, values)| Some((named.as_ref()?.columns, values?.finish())))
+                .collect(),
             slots,
             tree,
             bounds,
@@ -212,6 +236,19 @@ impl Mesh {
         Some(std::array::from_fn(|k| {
             let [a, b, c] = [a[k], b[k], c[k]].map(f64::from);
             a + barycentric[0] * (b - a) + barycentric[1] * (c - a)
+        }))
+    }
+
+    /// The value at a point of a triangle of the primvar with a number, missing components 0; `None` if there is none.
+    pub(super) fn primvar(&self, number: usize, primitive: u32, barycentric: [f64; 2]) -> Option<[f32; 4]> {
+        let (columns, values) = match self.uv_number == Some(number) {
+            true => (2, self.uv.as_ref()?),
+            false => self.primvars.get(number)?.as_ref().map(|(columns, values)| (*columns, values))?,
+        };
+        let [a, b, c] = values.padded(columns, self.triangles[primitive as usize], primitive);
+        Some(std::array::from_fn(|k| {
+            let [a, b, c] = [a[k], b[k], c[k]].map(f64::from);
+            (a + barycentric[0] * (b - a) + barycentric[1] * (c - a)) as f32
         }))
     }
 

@@ -42,7 +42,7 @@ pub use instances::{Instance, InstanceArray, Location, Numbering, Part};
 pub use mesh::{Mesh, MeshReport};
 pub use motion::{Deformation, PlaceSamples, Pose, Track, are_increasing};
 pub(crate) use placed::is_invertible;
-pub use polygons::{Interpolation, PolygonMesh, PrimvarView};
+pub use polygons::{Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
 pub use revolved::{Cap, Revolved};
 pub use solid::{Axis, Solid};
 pub use sphere::Sphere;

@@ -20,7 +20,12 @@ pub struct Object {
     /// Material per slot (slot 0: faces in no subset): `material_id`, 1-based index into
     /// [`Scene::materials`](super::Scene::materials), 0 for none.
     pub material_ids: Arc<[u32]>,
+    /// Constant primvars.
+    pub primvars: Option<ConstantPrimvars>,
 }
+
+/// Constant primvars by the number that they are looked up by.
+pub type ConstantPrimvars = Arc<[Option<[f32; 4]>]>;
 
 /// What every place of an array has of one part.
 #[derive(Clone, Debug)]
@@ -29,6 +34,8 @@ pub struct PartIds {
     pub prim_id: u32,
     /// Material per slot.
     pub material_ids: Arc<[u32]>,
+    /// Constant primvars.
+    pub primvars: Option<ConstantPrimvars>,
 }
 
 /// Shapes placed by an array of transforms.
@@ -126,6 +133,15 @@ impl Objects {
         }
     }
 
+    /// The constant primvar with a number of the object `index`.
+    pub fn primvar(&self, index: u32, number: usize) -> Option<[f32; 4]> {
+        let primvars = match self.numbering.locate(index) {
+            Location::Single(i) => &self.singles[i].primvars,
+            Location::InArray { array, part, .. } => &self.arrays[array].parts[part].primvars,
+        };
+        *primvars.as_ref()?.get(number)?
+    }
+
     /// The identifiers of the object `index`.
     pub fn ids(&self, index: u32) -> ObjectIds<'_> {
         match self.numbering.locate(index) {
@@ -136,7 +152,7 @@ impl Objects {
             Location::InArray { array, place, part } => {
                 let array = &self.arrays[array];
                 let element = array.indices.as_ref().map_or(place as u32, |indices| indices[place] as u32);
-                let PartIds { prim_id, ref material_ids } = array.parts[part];
+                let PartIds { prim_id, ref material_ids, .. } = array.parts[part];
                 ObjectIds { prim_id, instance_id: array.first_id + element, material_ids }
             }
         }
