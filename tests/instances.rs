@@ -161,7 +161,7 @@ fn lenses_and_solids_of_an_array_are_those_placed_one_by_one() {
     let mut elements = 0;
     for (i, j) in (-30..=30).flat_map(|i| (-24..=24).map(move |j| (i, j))) {
         let direction = DVec3::new(0.1 * f64::from(i), 0.1 * f64::from(j), -12.0).normalize();
-        let ray = Ray { origin: DVec3::ZERO, direction };
+        let ray = Ray { origin: DVec3::ZERO, direction, time: 0.0 };
         let hits = [&array_view, &plain_view].map(|view| view.intersect(&ray, &Departures::none()));
         assert_eq!(hits[0], hits[1]);
         let Some(hit) = hits[0] else { continue };

@@ -55,7 +55,7 @@ pub fn build(description: Description) -> Result<Scene> {
             Some(path) => instances.id(path, 1).ok_or_else(|| too_many(path))?,
         };
         let primvars = constants(single.placement, &primvars)?;
-        let world_from_object = single.transform;
+        let world_from_object = single.transform.into();
         objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars });
     }
     let prototypes = prototypes
@@ -65,7 +65,7 @@ pub fn build(description: Description) -> Result<Scene> {
             for part in placed {
                 let Some((shape, part_ids)) = compiler.part(part, &mut diagnostics)? else { continue };
                 let part_ids = PartIds { primvars: constants(part.placement, &primvars)?, ..part_ids };
-                parts.push(Part { shape, place_from_object: part.transform });
+                parts.push(Part { shape, place_from_object: part.transform.into() });
                 ids.push(part_ids);
             }
             Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids)))
@@ -73,8 +73,12 @@ pub fn build(description: Description) -> Result<Scene> {
         .collect::<Result<Vec<_>>>()?;
     let arrays = arrays.into_iter().filter_map(|array| {
         let (parts, ids) = &prototypes[array.prototype];
-        let instances =
-            InstanceArray { parts: Arc::clone(parts), places: array.places, world_from_array: array.transform };
+        let instances = InstanceArray {
+            parts: Arc::clone(parts),
+            places: array.places,
+            motion: None,
+            world_from_array: array.transform.into(),
+        };
         let parts = Arc::clone(ids);
         let placed = ObjectArray { instances, parts, first_id: array.first_id, indices: array.indices };
         (!placed.instances.is_empty()).then_some(placed)
