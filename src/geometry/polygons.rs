@@ -58,6 +58,17 @@ pub struct PrimvarView<'a> {
     pub interpolation: Interpolation,
 }
 
+/// A primvar that something looks up by its name.
+#[derive(Clone, Debug)]
+pub struct NamedPrimvar<'a> {
+    /// The name without `primvars:`.
+    pub name: &'a str,
+    /// Floats in a value, 1 to 4.
+    pub columns: usize,
+    /// The values.
+    pub view: PrimvarView<'a>,
+}
+
 /// A polygon mesh, as authored and unchecked.
 #[derive(Clone, Debug)]
 pub struct PolygonMesh<'a> {
@@ -77,6 +88,10 @@ pub struct PolygonMesh<'a> {
     pub normals: Option<PrimvarView<'a>>,
     /// Texture coordinates.
     pub uv: Option<PrimvarView<'a>>,
+    /// The number by which the texture coordinates are looked up as a primvar.
+    pub uv_number: Option<usize>,
+    /// Primvars that are looked up by number; those that the mesh lacks are `None`.
+    pub primvars: Vec<Option<NamedPrimvar<'a>>>,
     /// Faces with slots of their own: prim path of the subset and face indices.
     pub subsets: &'a [(&'a str, &'a [i32])],
     /// Makes the mesh the control mesh of a subdivision surface.
@@ -145,6 +160,13 @@ impl<'a> PolygonMesh<'a> {
         let mut mesh = self.clone();
         for (name, primvar, width) in [("normals", &mut mesh.normals, 3), ("primvars:st", &mut mesh.uv, 2)] {
             if let Some((attribute, problem)) = primvar.as_ref().and_then(|p| self.primvar_problem(name, p, width)) {
+                problems.push(MeshProblem { attribute, problem });
+                *primvar = None;
+            }
+        }
+        for primvar in &mut mesh.primvars {
+            let Some(NamedPrimvar { name, columns, view }) = primvar else { continue };
+            if let Some((attribute, problem)) = self.primvar_problem(&format!("primvars:{name}"), view, *columns) {
                 problems.push(MeshProblem { attribute, problem });
                 *primvar = None;
             }

@@ -1,6 +1,7 @@
 //! A subdivision surface as polygons on its limit surface, with everything that the control mesh carries.
 
-use super::super::{Buffer, Interpolation, PolygonMesh, PrimvarView};
+use super::super::motion::Deformation;
+use super::super::{Buffer, Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
 use super::{Refiner, Surface};
 
 /// Values over refined polygons.
@@ -29,6 +30,7 @@ pub(in super::super) struct Refined {
     holes: Vec<i32>,
     normals: Primvar,
     uv: Option<Primvar>,
+    primvars: Vec<Option<Primvar>>,
     /// The authored face of each face; empty where nothing asks.
     parents: Vec<u32>,
 }
@@ -38,6 +40,13 @@ impl Refined {
     pub(in super::super) fn new(refiner: &Refiner, polygons: &PolygonMesh<'_>) -> Self {
         let Surface { points, normals, normal_indices } = refiner.surface(&polygons.points);
         let uv = polygons.uv.as_ref().map(|uv| primvar::<2>(refiner, polygons, uv));
+        let refine = |NamedPrimvar { columns, view, .. }: &NamedPrimvar<'_>| match columns {
+            1 => primvar::<1>(refiner, polygons, view),
+            2 => primvar::<2>(refiner, polygons, view),
+            3 => primvar::<3>(refiner, polygons, view),
+            _ => primvar::<4>(refiner, polygons, view),
+        };
+        let primvars = polygons.primvars.iter().map(|named| named.as_ref().map(refine)).collect();
         let corners = refiner.corner_points();
         let has_holes = refiner.holes.iter().any(|&hole| hole);
         let parents =
@@ -58,12 +67,16 @@ impl Refined {
                 indices: normal_indices,
             },
             uv,
+            primvars,
             parents,
         }
     }
 
     /// As polygons, without subsets.
     pub(in super::super) fn polygons<'a>(&'a self, control: &PolygonMesh<'a>) -> PolygonMesh<'a> {
+        let named = |(named, refined): (&Option<NamedPrimvar<'a>>, &'a Option<Primvar>)| {
+            Some(NamedPrimvar { view: refined.as_ref()?.view(), ..named.clone()? })
+        };
         PolygonMesh {
             path: control.path,
             points: self.points.clone(),
@@ -73,6 +86,8 @@ impl Refined {
             left_handed: control.left_handed,
             normals: Some(self.normals.view()),
             uv: self.uv.as_ref().map(Primvar::view),
+            uv_number: control.uv_number,
+            primvars: control.primvars.iter().zip(&self.primvars).map(named).collect(),
             subsets: &[],
             subdivision: None,
         }
@@ -81,6 +96,15 @@ impl Refined {
     /// What the authored faces have, for each face.
     pub(in super::super) fn of_faces<T: Copy>(&self, authored: &[T]) -> Vec<T> {
         self.parents.iter().map(|&face| authored[face as usize]).collect()
+    }
+}
+
+impl Refiner {
+    /// The limit surface of points that move.
+    pub(in super::super) fn deformation(&self, control: &Deformation) -> Deformation {
+        let surfaces = control.points.iter().map(|points| self.surface(points));
+        let (points, normals) = surfaces.map(|s| (Buffer::from_vec(s.points), Buffer::from_vec(s.normals))).unzip();
+        Deformation { times: control.times.clone(), points, normals: Some(normals) }
     }
 }
 

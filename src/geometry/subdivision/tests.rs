@@ -63,6 +63,8 @@ impl Cage {
             left_handed: false,
             normals: None,
             uv: None,
+            uv_number: None,
+            primvars: Vec::new(),
             subsets: &[],
             subdivision: None,
         };
