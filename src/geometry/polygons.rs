@@ -160,14 +160,14 @@ impl<'a> PolygonMesh<'a> {
         let mut mesh = self.clone();
         for (name, primvar, width) in [("normals", &mut mesh.normals, 3), ("primvars:st", &mut mesh.uv, 2)] {
             if let Some((attribute, problem)) = primvar.as_ref().and_then(|p| self.primvar_problem(name, p, width)) {
-                problems.push(MeshProblem { attribute, problem });
+                problems.push(MeshProblem { attribute, problem: format!("{problem}; it is left out") });
                 *primvar = None;
             }
         }
         for primvar in &mut mesh.primvars {
             let Some(NamedPrimvar { name, columns, view }) = primvar else { continue };
             if let Some((attribute, problem)) = self.primvar_problem(&format!("primvars:{name}"), view, *columns) {
-                problems.push(MeshProblem { attribute, problem });
+                problems.push(MeshProblem { attribute, problem: format!("{problem}; it is left out") });
                 *primvar = None;
             }
         }

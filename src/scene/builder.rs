@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::description::{self, Array, Description, Document, Element, Placement};
 use super::manifest::Manifest;
 use super::material::{self, Context, Material, ScalarIor};
+use super::meshes;
 use super::objects::{ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
 use super::solids;
 use super::unroll::{self, Placed, Unrolled};
@@ -217,7 +218,7 @@ fn build_shapes(
             }
         };
         if let (description::Shape::Mesh(mesh), Some(report)) = (shape, &report) {
-            report_mesh(mesh, report, diagnostics);
+            meshes::report(mesh, report, diagnostics);
         }
         let report = match report {
             None => {
@@ -237,19 +238,6 @@ fn build_shapes(
         shapes.push(Some((compiled, report)));
     }
     Ok(shapes)
-}
-
-fn report_mesh(mesh: &description::Mesh, report: &MeshReport, diagnostics: &mut Diagnostics) {
-    if report.degenerate > 0 {
-        diagnostics.warn(
-            "degenerate-faces",
-            &mesh.path,
-            format!("{} triangles without area are left out", report.degenerate),
-        );
-    }
-    if report.triangles == 0 {
-        diagnostics.warn("empty-mesh", &mesh.path, "it has no face with an area: nothing of it is seen");
-    }
 }
 
 /// What became of a shape.
@@ -304,7 +292,7 @@ fn compile_shape(description: &Description, shape: &description::Shape, names: &
                 uv_number: names.iter().position(|name| mesh.uv_name.as_ref() == Some(name)),
                 primvars: names.iter().map(|name| arrays.named_primvar(mesh, name)).collect::<Result<_>>()?,
                 subsets: &subsets,
-                subdivision: None,
+                subdivision: meshes::subdivision(&arrays, mesh, counts)?,
             };
             let mesh = Mesh::from_polygons(&polygons);
             Ok(mesh.map(|(mesh, report)| Built::Shape(Arc::new(Shape::Mesh(mesh)), Some(report))))
@@ -347,7 +335,7 @@ impl<'a> NamedArrays<'a> {
     }
 
     /// Shares the memory of a float array.
-    fn buffer<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
+    pub(super) fn buffer<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
         self.share(name, Element::F32, columns)
     }
 
@@ -367,7 +355,7 @@ impl<'a> NamedArrays<'a> {
             .map_err(|problem| Error::scene(self.place, format!("array '{name}': {problem}")))
     }
 
-    fn integers(&self, name: &str) -> Result<&'a [i32]> {
+    pub(super) fn integers(&self, name: &str) -> Result<&'a [i32]> {
         let array = self.get(name, Element::I32, 1)?;
         bytemuck::try_cast_slice(&array.bytes).map_err(|_| {
             Error::scene(self.place, format!("array '{name}' is not aligned to its elements: write the file again"))

@@ -161,6 +161,7 @@ impl Stagehand {
             uv_name: None,
             primvars: BTreeMap::new(),
             subsets: vec![],
+            subdivision: None,
         }));
         self.place(path, transform, material);
     }

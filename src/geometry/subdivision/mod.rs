@@ -22,7 +22,7 @@ mod tests;
 
 pub(super) use refined::Refined;
 
-use super::{Interpolation, PolygonMesh};
+use super::{Buffer, Interpolation, PolygonMesh};
 use masks::Masks;
 use topology::{INFINITE, Level};
 
@@ -112,11 +112,33 @@ pub struct Subdivision<'a> {
     /// Points of each crease, at least two.
     pub crease_lengths: &'a [i32],
     /// One a crease, or one an edge of every crease.
-    pub crease_sharpnesses: &'a [f32],
+    pub crease_sharpnesses: Option<Buffer<f32>>,
     /// Points that are sharp.
     pub corner_indices: &'a [i32],
     /// One a corner.
-    pub corner_sharpnesses: &'a [f32],
+    pub corner_sharpnesses: Option<Buffer<f32>>,
+}
+
+/// Triangles that a mesh is refined to at most where nobody asked for a level.
+const DEFAULT_TRIANGLES: u64 = 1 << 22;
+
+impl Subdivision<'_> {
+    /// The level where none is asked for: 2, and 1 for control meshes so fine that 2 would make more than four million
+    /// triangles.
+    ///
+    /// Level 0 is no choice: facets bend glass in steps. At level 2 a face of the control mesh is 16 patches with exact
+    /// corners and normals, and what interpolation leaves is below a percent of the dispersion through a lens of eight faces
+    /// across (`tests/subdivision.rs` shows the rate: a quarter with each level).
+    pub fn default_level(scheme: Scheme, counts: &[i32]) -> u32 {
+        let corners = counts.iter().map(|&n| n.max(0) as u64).sum();
+        if triangles_at(scheme, 2, counts.len() as u64, corners) <= DEFAULT_TRIANGLES { 2 } else { 1 }
+    }
+}
+
+/// Triangles at a level of at least 1; `u64::MAX` where they cannot be counted.
+fn triangles_at(scheme: Scheme, level: u32, faces: u64, corners: u64) -> u64 {
+    let first = if scheme == Scheme::Loop { 4 * faces } else { 2 * corners };
+    1_u64.checked_shl(2 * (level - 1)).and_then(|more| first.checked_mul(more)).unwrap_or(u64::MAX)
 }
 
 /// More triangles than this are not made of one mesh: the level is lowered until they fit.
@@ -287,18 +309,15 @@ impl Refiner {
 
 /// How many levels make no more triangles than allowed.
 fn affordable(subdivision: &Subdivision<'_>, faces: usize, corners: usize) -> u32 {
-    let first = if subdivision.scheme == Scheme::Loop { 4 * faces as u64 } else { 2 * corners as u64 };
-    let fits = |level: &u32| {
-        first.checked_shl(2 * (level - 1)).is_some_and(|n| n >> (2 * (level - 1)) == first && n <= MAX_TRIANGLES)
-    };
-    // Nothing at all could be divided for ever.
+    let fits = |level: &u32| triangles_at(subdivision.scheme, *level, faces as u64, corners as u64) <= MAX_TRIANGLES;
+    // No faces at all could be divided for ever.
     (1..=subdivision.level.min(12)).take_while(fits).last().unwrap_or(0)
 }
 
 /// Gives the edges of creases their sharpness.
 fn sharpen_edges(base: &mut Level, subdivision: &Subdivision<'_>, problems: &mut Vec<String>) {
-    let Subdivision { crease_indices: indices, crease_lengths: lengths, crease_sharpnesses: sharpnesses, .. } =
-        subdivision;
+    let Subdivision { crease_indices: indices, crease_lengths: lengths, .. } = subdivision;
+    let sharpnesses = subdivision.crease_sharpnesses.as_deref().unwrap_or_default();
     if indices.is_empty() && lengths.is_empty() {
         return;
     }
@@ -384,7 +403,8 @@ fn authored_infinite(base: &Level, subdivision: &Subdivision<'_>) -> std::collec
 
 /// Gives corners their sharpness, authored ones and those that the boundary rule asks for.
 fn sharpen_vertices(base: &mut Level, subdivision: &Subdivision<'_>, problems: &mut Vec<String>) {
-    let Subdivision { corner_indices: indices, corner_sharpnesses: sharpnesses, .. } = subdivision;
+    let indices = subdivision.corner_indices;
+    let sharpnesses = subdivision.corner_sharpnesses.as_deref().unwrap_or_default();
     if indices.len() != sharpnesses.len() {
         problems.push(format!(
             "cornerSharpnesses has {} values for {} cornerIndices: the corners are left out",
@@ -393,7 +413,7 @@ fn sharpen_vertices(base: &mut Level, subdivision: &Subdivision<'_>, problems: &
         ));
     } else {
         let mut unknown = 0;
-        for (&index, &sharpness) in indices.iter().zip(*sharpnesses) {
+        for (&index, &sharpness) in indices.iter().zip(sharpnesses) {
             match usize::try_from(index).ok().and_then(|i| base.vertex_sharpness.get_mut(i)) {
                 Some(kept) => *kept = kept.max(clean(sharpness)),
                 None => unknown += 1,

@@ -50,9 +50,9 @@ impl Cage {
             triangles: self.triangles,
             crease_indices: &crease_indices,
             crease_lengths: &crease_lengths,
-            crease_sharpnesses: &crease_sharpnesses,
+            crease_sharpnesses: Some(Buffer::from_vec(crease_sharpnesses)),
             corner_indices: &corner_indices,
-            corner_sharpnesses: &corner_sharpnesses,
+            corner_sharpnesses: Some(Buffer::from_vec(corner_sharpnesses)),
         };
         let polygons = PolygonMesh {
             path: "/Cage",
