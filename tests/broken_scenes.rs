@@ -74,6 +74,8 @@ fn placement(path: &str, target: Target) -> Placement {
         material: None,
         subset_materials: vec![],
         double_sided: false,
+        hidden_from_camera: false,
+        matte: false,
     }
 }
 
