@@ -51,6 +51,8 @@ fn mesh(points: &Buffer<[f32; 3]>, counts: &[i32], indices: &[i32]) -> Mesh {
         left_handed: false,
         normals: None,
         uv: None,
+        uv_number: None,
+        primvars: Vec::new(),
         subsets: &[],
     };
     Mesh::from_polygons(&polygons).expect("a ball").0

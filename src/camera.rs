@@ -172,13 +172,14 @@ impl Camera {
         &self.clipping
     }
 
-    /// A box in render space that holds the beginnings of all rays through the raster from `low` to `high`; `None` where it
-    /// is one point, the origin.
-    pub fn start_box(&self, low: [f64; 2], high: [f64; 2]) -> Option<[DVec3; 2]> {
+    /// A box in render space that holds the beginnings of all rays through the raster; `None` where it is one point, the
+    /// origin.
+    pub fn start_box(&self) -> Option<[DVec3; 2]> {
         let corners = match (self.is_orthographic, &self.lens) {
             (true, _) => {
-                let corner = |x: f64, y: f64| self.ray(&CameraSample::at(x, y)).point;
-                [corner(low[0], low[1]), corner(low[0], high[1]), corner(high[0], low[1]), corner(high[0], high[1])]
+                let [width, height] = self.resolution.map(f64::from);
+                let corner = |x, y| self.ray(&CameraSample::at(x, y)).point;
+                [corner(0.0, 0.0), corner(0.0, height), corner(width, 0.0), corner(width, height)]
             }
             (false, Some(([x_axis, y_axis], lens))) => {
                 let [x, y] = [*x_axis * lens.radius, *y_axis * lens.radius];

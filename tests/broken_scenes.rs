@@ -73,6 +73,7 @@ fn placement(path: &str, target: Target) -> Placement {
         instance: None,
         material: None,
         subset_materials: vec![],
+        primvars: Default::default(),
         double_sided: false,
         hidden_from_camera: false,
         matte: false,

@@ -148,6 +148,7 @@ fn lenses_and_solids_of_an_array_are_those_placed_one_by_one() {
             transform: Some(DMat4::from(place).to_cols_array()),
             material: None,
             subset_materials: vec![],
+            primvars: Default::default(),
             instance: Some(format!("/World/Lamp{i}")),
             double_sided: false,
             hidden_from_camera: false,

@@ -178,6 +178,14 @@ impl Aggregate {
         }
     }
 
+    /// The primvar with a number at a hit; `None` where the shape has none (always, for analytic shapes).
+    pub fn primvar(&self, hit: &Hit, number: usize) -> Option<[f32; 4]> {
+        match self.shape(hit.instance) {
+            Shape::Sphere(_) | Shape::Solid(_) => None,
+            Shape::Mesh(mesh) => mesh.primvar(number, hit.primitive, hit.barycentric),
+        }
+    }
+
     /// The material slot that was hit: 0 for faces in no subset, k + 1 for the k-th subset.
     pub fn slot(&self, hit: &Hit) -> u32 {
         match self.shape(hit.instance) {
@@ -212,6 +220,21 @@ impl Aggregate {
                     bounds.min.cmple(other.max + margin).all() && other.min.cmple(bounds.max + margin).all()
                 })
                 && self.with(other, |placed| placed.may_meet(&search))
+        })
+    }
+
+    /// Whether some surface of an instance that `is_member` may lie in the box `[min, max]`, in render space; a no is certain.
+    pub fn has_surface_in(&self, [min, max]: [DVec3; 2], is_member: impl Fn(u32) -> bool) -> bool {
+        let search = Bounds { min, max };
+        let margin = search.reach().max(self.tree.reach()) * self.spread * 2f64.powi(-46);
+        let search = Bounds { min: min - margin, max: max + margin };
+        self.tree.any_meeting(&search, |i| {
+            let instance = self.instance(i);
+            is_member(instance)
+                && self
+                    .bounds_of(instance)
+                    .is_some_and(|bounds| bounds.min.cmple(search.max).all() && search.min.cmple(bounds.max).all())
+                && self.with(instance, |placed| placed.may_meet(&search))
         })
     }
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Buffer;
-use super::polygons::{Interpolation, PolygonMesh, PrimvarView};
+use super::polygons::{Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
 use super::start::{Start, behind};
 use super::topology;
 use super::tree::{Bounds, Tree};
@@ -25,6 +25,9 @@ pub struct Mesh {
     normals: Option<CornerValues>,
     normals_reversed: bool,
     uv: Option<CornerValues>,
+    uv_number: Option<usize>,
+    /// By the number that they are looked up by, with the floats in a value.
+    primvars: Vec<Option<(usize, CornerValues)>>,
     slots: Option<Vec<u16>>,
     tree: Tree,
     bounds: Bounds,
@@ -61,11 +64,23 @@ struct CornerValues {
 
 impl CornerValues {
     fn at<const N: usize>(&self, triangle: [u32; 3], primitive: u32) -> [[f32; N]; 3] {
-        let indices = self.indices.as_ref().map_or(triangle, |indices| indices[primitive as usize]);
-        indices.map(|i| {
+        self.corners(triangle, primitive).map(|i| {
             let first = i as usize * N;
             std::array::from_fn(|k| self.values[first + k])
         })
+    }
+
+    /// Values of `columns` floats, up to four; the others are 0.
+    fn padded(&self, columns: usize, triangle: [u32; 3], primitive: u32) -> [[f32; 4]; 3] {
+        self.corners(triangle, primitive).map(|i| {
+            let mut value = [0.0; 4];
+            value[..columns].copy_from_slice(&self.values[i as usize * columns..][..columns]);
+            value
+        })
+    }
+
+    fn corners(&self, triangle: [u32; 3], primitive: u32) -> [u32; 3] {
+        self.indices.as_ref().map_or(triangle, |indices| indices[primitive as usize])
     }
 }
 
@@ -90,6 +105,9 @@ impl Mesh {
                 polygons.check_primvar(name, primvar, width)?;
             }
         }
+        for NamedPrimvar { name, columns, view } in polygons.primvars.iter().flatten() {
+            polygons.check_primvar(&format!("primvars:{name}"), view, *columns)?;
+        }
         let mut report =
             MeshReport { short_faces: polygons.counts.iter().filter(|&&n| n < 3).count(), ..MeshReport::default() };
         let face_slots = face_slots(polygons, &mut report);
@@ -98,6 +116,8 @@ impl Mesh {
         let mut slots = face_slots.as_ref().map(|_| Vec::new());
         let mut normals = polygons.normals.as_ref().map(Collector::new);
         let mut uv = polygons.uv.as_ref().map(Collector::new);
+        let mut primvars: Vec<_> =
+            polygons.primvars.iter().map(|named| Some(Collector::new(&named.as_ref()?.view))).collect();
         polygons.triangulate(|face, corners| {
             if is_sliver(corners.map(|corner| polygons.point(corner))) {
                 report.degenerate += 1;
@@ -107,7 +127,7 @@ impl Mesh {
             if let (Some(slots), Some(face_slots)) = (&mut slots, &face_slots) {
                 slots.push(face_slots[face]);
             }
-            for values in [&mut normals, &mut uv].into_iter().flatten() {
+            for values in [&mut normals, &mut uv].into_iter().chain(&mut primvars).flatten() {
                 values.push(face, corners, polygons.indices);
             }
         });
@@ -127,6 +147,10 @@ impl Mesh {
             normals: normals.map(Collector::finish),
             normals_reversed: false,
             uv: uv.map(Collector::finish),
+            uv_number: polygons.uv_number,
+            primvars: (polygons.primvars.iter().zip(primvars))
+                .map(|(named, values)| Some((named.as_ref()?.columns, values?.finish())))
+                .collect(),
             slots,
             tree,
             bounds,
@@ -176,6 +200,19 @@ impl Mesh {
         Some(std::array::from_fn(|k| {
             let [a, b, c] = [a[k], b[k], c[k]].map(f64::from);
             a + barycentric[0] * (b - a) + barycentric[1] * (c - a)
+        }))
+    }
+
+    /// The value at a point of a triangle of the primvar with a number, missing components 0; `None` if there is none.
+    pub(super) fn primvar(&self, number: usize, primitive: u32, barycentric: [f64; 2]) -> Option<[f32; 4]> {
+        let (columns, values) = match self.uv_number == Some(number) {
+            true => (2, self.uv.as_ref()?),
+            false => self.primvars.get(number)?.as_ref().map(|(columns, values)| (*columns, values))?,
+        };
+        let [a, b, c] = values.padded(columns, self.triangles[primitive as usize], primitive);
+        Some(std::array::from_fn(|k| {
+            let [a, b, c] = [a[k], b[k], c[k]].map(f64::from);
+            (a + barycentric[0] * (b - a) + barycentric[1] * (c - a)) as f32
         }))
     }
 

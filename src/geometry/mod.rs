@@ -40,7 +40,7 @@ pub(crate) use instances::affine;
 pub use instances::{Instance, InstanceArray, Location, Numbering, Part};
 pub use mesh::{Mesh, MeshReport};
 pub(crate) use placed::is_invertible;
-pub use polygons::{Interpolation, PolygonMesh, PrimvarView};
+pub use polygons::{Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
 pub use revolved::{Cap, Revolved};
 pub use solid::{Axis, Solid};
 pub use sphere::Sphere;

@@ -93,6 +93,19 @@ impl<'a> View<'a> {
         self.aggregate.coincident(ray, departures, |object| self.has_backing(object))
     }
 
+    /// Whether rays of the camera itself pass through the surface at `hit`.
+    pub fn is_hidden_from_camera(&self, hit: &Hit) -> bool {
+        self.scene.objects.hides_some() && self.scene.objects.ids(hit.instance).appearance.hidden_from_camera
+    }
+
+    /// Whether some surface of a glass may lie in the box `[min, max]`, in render space.
+    pub fn has_glass_in(&self, search: [DVec3; 2]) -> bool {
+        let has_interior =
+            |id: &u32| id.checked_sub(1).is_some_and(|i| self.scene.materials[i as usize].has_interior());
+        self.aggregate
+            .has_surface_in(search, |object| self.scene.objects.ids(object).material_ids.iter().any(has_interior))
+    }
+
     /// `material_id` at `hit`, 0 for none.
     pub fn material_id(&self, hit: &Hit) -> u32 {
         let ids = self.scene.objects.ids(hit.instance).material_ids;

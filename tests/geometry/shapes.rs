@@ -16,6 +16,8 @@ pub(crate) fn polygons<'a>(points: &[[f32; 3]], counts: &'a [i32], indices: &'a 
         left_handed: false,
         normals: None,
         uv: None,
+        uv_number: None,
+        primvars: Vec::new(),
         subsets: &[],
     }
 }

@@ -12,7 +12,7 @@ import numpy.typing as npt
 __all__ = ["Array", "ArrayTable", "Description", "Diagnostics"]
 
 Array = npt.NDArray[Any]
-"""A float32, float64 or int32 array of shape (n,) or (n, k); usually USD's own memory, read-only."""
+"""A float32, float64, int32 or uint8 array of shape (n,) or (n, k); usually USD's own memory, read-only."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,6 @@ class ArrayTable:
     def add(self, name: str, array: Array) -> str:
         """Store ``array`` and return its name."""
         assert name not in self.arrays, f"array {name} is stored twice"
-        assert array.dtype in (np.float32, np.float64, np.int32), f"array {name} is {array.dtype}"
+        assert array.dtype in (np.float32, np.float64, np.int32, np.uint8), f"array {name} is {array.dtype}"
         self.arrays[name] = array
         return name

@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import StageError, UsageError
 from . import tokens
 from ._pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+from .assets import AssetReader
 from .cameras import find_camera, framed_camera, read_camera
 from .composition import composition_warnings, quiet_usd
 from .description import Array, ArrayTable, Description, Diagnostics
@@ -460,6 +461,7 @@ def _read(
     settings_prim = find_settings(stage, render_settings, source, diagnostics)
     walk = _Walk(opened, time, _purposes(purposes, settings_prim), diagnostics)
     walk.run()
+    assets = AssetReader(stage, time)
     materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim))
     groups = walk.bind(materials)
 
@@ -493,12 +495,14 @@ def _read(
         "groups": groups,
         "root": 0,
         "materials": materials.materials,
+        "textures": assets.textures,
         "cameras": cameras,
         "settings": settings,
         "warnings": diagnostics.warnings(),
         "skipped": diagnostics.skipped,
+        "strict_assets": missing == "error",
     }
-    return Description(document, walk.arrays())
+    return Description(document, {**walk.arrays(), **assets.arrays})
 
 
 def _warn_of_motion(
