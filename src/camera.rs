@@ -35,6 +35,10 @@ pub enum ConformPolicy {
 }
 
 impl ConformPolicy {
+    /// Their names in USD.
+    pub const TOKENS: [&str; 5] =
+        ["expandAperture", "cropAperture", "adjustApertureWidth", "adjustApertureHeight", "adjustPixelAspectRatio"];
+
     /// The policy called `token`.
     pub fn from_token(token: &str) -> Option<Self> {
         Some(match token {
