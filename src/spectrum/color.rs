@@ -62,9 +62,6 @@ impl RgbSpace {
 
     /// The matrix from this space to `other`: what is white in one is white in the other.
     pub fn to(&self, other: &Self) -> DMat3 {
-        if self.white == other.white {
-            return other.rgb_from_xyz() * self.xyz_from_rgb();
-        }
         other.rgb_from_xyz() * adaptation(self.white, other.white) * self.xyz_from_rgb()
     }
 }
