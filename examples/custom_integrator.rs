@@ -69,8 +69,7 @@ impl Worker for PerThread<'_> {
     fn render(&mut self, pixel: [i32; 2], out: &mut PixelAccumulator) {
         let Prepared { task, follower } = self.prepared;
         for index in task.samples.begin..task.samples.end {
-            let [dx, dy] = task.sampler.position(pixel, index);
-            let start = task.camera.ray(f64::from(pixel[0]) + dx, f64::from(pixel[1]) + dy);
+            let start = task.camera.ray(&task.sampler.sample(pixel, index));
             let met = follower.first_surface(&start, &mut self.counters);
             out.add(0, met.map(|met| [start.direction.dot(met.surface.n_g).abs()]));
         }

@@ -7,6 +7,7 @@ use glam::{DMat4, DVec3};
 
 use crate::error::{Error, Result};
 use crate::ray::RayStart;
+use crate::sampler::CameraSample;
 use crate::scene::description;
 
 /// How a camera's aperture is fitted to the image (`aspectRatioConformPolicy` of UsdRender).
@@ -135,9 +136,9 @@ impl Camera {
         })
     }
 
-    /// The ray through raster position (`x`, `y`), x right and y down from the top-left corner, with its derivatives
-    /// per pixel, in render space (relative to [`position`](Self::position)).
-    pub fn ray(&self, x: f64, y: f64) -> RayStart {
+    /// The ray of `sample` with its derivatives per pixel, in render space (relative to [`position`](Self::position)).
+    pub fn ray(&self, sample: &CameraSample) -> RayStart {
+        let [x, y] = sample.raster;
         let x = x - 0.5 * f64::from(self.resolution[0]);
         let y = 0.5 * f64::from(self.resolution[1]) - y;
         if self.is_orthographic {
@@ -151,6 +152,7 @@ impl Camera {
                 direction_xx: DVec3::ZERO,
                 direction_xy: DVec3::ZERO,
                 direction_yy: DVec3::ZERO,
+                time: 0.0,
             };
         }
         let big_d = self.look + x * self.right + y * self.up;
@@ -175,6 +177,7 @@ impl Camera {
             direction_xx: second(along_a, d_a, along_a, d_a),
             direction_xy: second(along_a, d_a, along_b, d_b),
             direction_yy: second(along_b, d_b, along_b, d_b),
+            time: 0.0,
         }
     }
 
@@ -216,7 +219,7 @@ mod tests {
     fn derivatives_are_those_of_the_rays() {
         let camera = camera();
         let (x, y) = (11.5, 7.25);
-        let at = |dx: f64, dy: f64| camera.ray(x + dx, y - dy);
+        let at = |dx: f64, dy: f64| camera.ray(&CameraSample::at(x + dx, y - dy));
         let h = 1e-4;
         let start = at(0.0, 0.0);
         let check = |name: &str, analytic: DVec3, difference: DVec3, tolerance: f64| {
@@ -232,7 +235,7 @@ mod tests {
 
     #[test]
     fn the_second_derivative_keeps_the_length() {
-        let start = camera().ray(3.0, 30.0);
+        let start = camera().ray(&CameraSample::at(3.0, 30.0));
         let residual = start.direction_x.length_squared() + start.direction.dot(start.direction_xx);
         assert!(residual.abs() <= 1e-16, "{residual}");
     }

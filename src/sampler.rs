@@ -1,11 +1,37 @@
-//! Where in the pixel samples are taken: decided by (pixel, sample index, seed) alone.
+//! Where in the pixel, on the lens and in the shutter's time samples are taken: decided by (pixel, sample index, seed) alone.
+//!
+//! Dimensions of the Sobol' sequence: 0, 1 the position in the pixel (x right, y down); 2, 3 the point on the lens. They
+//! come from one call and cost nothing where they are not used.
 
 use crate::error::{Error, Result};
 
 /// The most samples a pixel can have: the length of the Sobol' sequence that `sobol_burley` holds.
 pub const MAX_SAMPLES: u32 = 1 << 16;
 
-/// Positions in the unit square of a pixel.
+/// Everything that a camera ray depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraSample {
+    /// On the full raster in pixels, x right, y down from the top-left corner.
+    pub raster: [f64; 2],
+    /// On the lens, as a point of the unit square; (½, ½) is its centre.
+    pub lens: [f64; 2],
+    /// Within the shutter's opening, 0 to 1; ½ is its middle.
+    pub time: f64,
+}
+
+impl CameraSample {
+    /// At raster position (`x`, `y`), through the centre of the lens, at the middle of the shutter's time.
+    pub const fn at(x: f64, y: f64) -> Self {
+        Self { raster: [x, y], lens: [0.5; 2], time: 0.5 }
+    }
+
+    /// The same but for the raster position, moved by `x` right and `y` down.
+    pub fn moved(&self, x: f64, y: f64) -> Self {
+        Self { raster: [self.raster[0] + x, self.raster[1] + y], ..*self }
+    }
+}
+
+/// Samples of pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
     samples: u32,
@@ -21,16 +47,18 @@ impl Sampler {
         Ok(Self { samples, seed })
     }
 
-    /// Position of sample `index` of `pixel` inside the pixel, x right, y down, in [0, 1).
+    /// Sample `index` of `pixel`.
     ///
-    /// One sample stands at the centre; more follow an Owen-scrambled Sobol' sequence (Burley 2020), scrambled per pixel.
-    pub fn position(&self, pixel: [i32; 2], index: u32) -> [f64; 2] {
+    /// One sample stands at the centre of everything; more follow an Owen-scrambled Sobol' sequence (Burley 2020), scrambled
+    /// per pixel.
+    pub fn sample(&self, pixel: [i32; 2], index: u32) -> CameraSample {
+        let [x, y] = pixel.map(f64::from);
         if self.samples == 1 {
-            return [0.5, 0.5];
+            return CameraSample::at(x + 0.5, y + 0.5);
         }
         let seed = hash(self.seed ^ (u64::from(pixel[0] as u32) << 32 | u64::from(pixel[1] as u32)));
-        let point = sobol_burley::sample_4d(index, 0, (seed ^ (seed >> 32)) as u32);
-        [f64::from(point[0]), f64::from(point[1])]
+        let [dx, dy, u, v] = sobol_burley::sample_4d(index, 0, (seed ^ (seed >> 32)) as u32).map(f64::from);
+        CameraSample { raster: [x + dx, y + dy], lens: [u, v], time: 0.5 }
     }
 }
 
@@ -49,26 +77,31 @@ mod tests {
 
     #[test]
     fn one_sample_stands_at_the_centre() {
-        assert_eq!(Sampler::new(1, 7).unwrap().position([3, -4], 0), [0.5, 0.5]);
+        assert_eq!(Sampler::new(1, 7).unwrap().sample([3, -4], 0), CameraSample::at(3.5, -3.5));
     }
 
     #[test]
-    fn every_quarter_of_a_pixel_gets_a_quarter_of_the_samples() {
+    fn every_quarter_of_pixel_and_lens_gets_a_quarter_of_the_samples() {
         let sampler = Sampler::new(64, 1).unwrap();
-        let mut counts = [0; 4];
+        let mut counts = [[0; 4]; 2];
         for i in 0..64 {
-            let [x, y] = sampler.position([10, 20], i);
-            assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y));
-            counts[usize::from(x >= 0.5) + 2 * usize::from(y >= 0.5)] += 1;
+            let CameraSample { raster: [x, y], lens, .. } = sampler.sample([10, 20], i);
+            for (counts, [x, y]) in counts.iter_mut().zip([[x - 10.0, y - 20.0], lens]) {
+                assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y));
+                counts[usize::from(x >= 0.5) + 2 * usize::from(y >= 0.5)] += 1;
+            }
         }
-        assert_eq!(counts, [16; 4]);
+        assert_eq!(counts, [[16; 4]; 2]);
     }
 
     #[test]
     fn neighbours_and_seeds_differ() {
-        let at = |seed, pixel| Sampler::new(16, seed).unwrap().position(pixel, 5);
-        assert_ne!(at(0, [0, 0]), at(0, [1, 0]));
-        assert_ne!(at(0, [0, 0]), at(1, [0, 0]));
+        let within = |seed, pixel: [i32; 2]| {
+            let sample = Sampler::new(16, seed).unwrap().sample(pixel, 5);
+            (sample.moved(f64::from(-pixel[0]), f64::from(-pixel[1])).raster, sample.lens)
+        };
+        assert_ne!(within(0, [0, 0]), within(0, [1, 0]));
+        assert_ne!(within(0, [0, 0]), within(1, [0, 0]));
     }
 
     #[test]

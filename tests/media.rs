@@ -11,6 +11,7 @@ use abbe::integrator::transmittance::{Coefficients, Segment};
 use abbe::optics::{Extinction, catalog};
 use abbe::ray::{ColumnSet, SecondOrderColumns};
 use abbe::render::trace::trace;
+use abbe::sampler::CameraSample;
 use abbe::scene::Scene;
 use abbe::scene::view::{Media, View};
 use abbe::spectrum::{REFERENCE, Wavelength, response};
@@ -82,7 +83,7 @@ fn follow(scene: &Scene, wavelength: Wavelength, offset: DVec2) -> Way {
     let media = Media::at(scene, wavelength, 1.0).expect("media");
     let mut segments: Vec<Segment> = Vec::new();
     let mut counters = Counters::default();
-    let start = camera.ray(15.5 + offset.x, 10.5 + offset.y);
+    let start = camera.ray(&CameraSample::at(15.5 + offset.x, 10.5 + offset.y));
     let record = Record { steps: None, segments: Some(&mut segments) };
     let chain = Follower::new(&view).follow(&start, &media, record, &mut counters);
     let [transmittance] = Coefficients::at(scene, [wavelength]).transmittance(&segments);

@@ -10,6 +10,7 @@ use abbe::film::{SampleRange, Values};
 use abbe::integrator::chain::{Chain, Counters, End, Follower, Record};
 use abbe::ray::{ColumnSet, NoColumns, ScreenColumns, SecondOrderColumns};
 use abbe::render::Request;
+use abbe::sampler::CameraSample;
 use abbe::scene::Scene;
 use abbe::scene::description::Shape;
 use abbe::scene::view::{Media, View};
@@ -33,7 +34,12 @@ impl Bench<'_> {
     fn chain<C: ColumnSet>(&self, raster: DVec2, nm: f64) -> Chain<C> {
         let media = Media::at(self.scene, Wavelength::from_nanometers(nm), 1.0).unwrap();
         let follower = Follower::new(self.view);
-        follower.follow(&self.camera.ray(raster.x, raster.y), &media, Record::none(), &mut Counters::default())
+        follower.follow(
+            &self.camera.ray(&CameraSample::at(raster.x, raster.y)),
+            &media,
+            Record::none(),
+            &mut Counters::default(),
+        )
     }
 
     fn end(&self, raster: DVec2, nm: f64) -> Option<DVec3> {

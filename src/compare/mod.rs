@@ -19,6 +19,7 @@ use crate::ray::{
     second_order_along,
 };
 use crate::render::Plan;
+use crate::sampler::CameraSample;
 use crate::scene::Scene;
 use crate::scene::view::{Media, View};
 use crate::spectrum::Wavelength;
@@ -108,7 +109,7 @@ pub fn compare(scene: &Scene, plan: &Plan, rounds: usize) -> Result<Comparison> 
     let window = plan.window;
     let starts: Vec<RayStart> = (window.y0..window.y1)
         .flat_map(|y| (window.x0..window.x1).map(move |x| (x, y)))
-        .map(|(x, y)| camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5))
+        .map(|(x, y)| camera.ray(&CameraSample::at(f64::from(x) + 0.5, f64::from(y) + 0.5)))
         .collect();
     let rounds = rounds.max(1);
     let costs = costs(&tracer, nm, &starts, rounds)?;
@@ -258,7 +259,7 @@ fn methods(tracer: &Tracer<'_>, nm: f64, cases: &[Case], rounds: usize) -> Resul
                 let mut counters = Counters::default();
                 let _: Chain<NoColumns> =
                     tracer.follower.follow(start, media, Record::of_steps(&mut log), &mut counters);
-                let medium = tracer.follower.start_medium(media);
+                let medium = tracer.follower.start_medium(media, start.time);
                 Some(single::lambda_column(start, &medium, &log))
             })
         }),
@@ -309,7 +310,7 @@ fn methods(tracer: &Tracer<'_>, nm: f64, cases: &[Case], rounds: usize) -> Resul
 
 fn predictions(tracer: &Tracer<'_>, nm: f64, cases: &[Case]) -> Result<Vec<Prediction>> {
     let media = tracer.media(nm)?;
-    let medium = tracer.follower.start_medium(&media);
+    let medium = tracer.follower.start_medium(&media, 0.0);
     let [mut here, mut there] = [Vec::new(), Vec::new()];
     let mut rows = Vec::new();
     for delta in DISTANCES {
@@ -354,7 +355,7 @@ fn costs(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart], rounds: usize) -> Re
     let second_chain = || {
         let mut counters = Counters::default();
         let mut log = Vec::new();
-        let medium = tracer.follower.start_medium(&media);
+        let medium = tracer.follower.start_medium(&media, 0.0);
         let begin = Instant::now();
         for start in starts {
             let chain = tracer.follower.follow::<ScreenColumns>(

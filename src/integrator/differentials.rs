@@ -17,6 +17,7 @@ use crate::ray::{
     ColumnSet, LambdaColumn, NoColumns, RayStart, ScreenColumns, SecondOrderColumns, Step, direction_derivative,
     direction_second_derivative, half_width, screen_motion, second_order_along,
 };
+use crate::sampler::CameraSample;
 use crate::scene::material::{Kind, Material};
 use crate::scene::view::{Media, View};
 
@@ -183,8 +184,7 @@ impl<C: ColumnSet> Worker for Carrier<'_, C> {
     fn render(&mut self, pixel: [i32; 2], out: &mut PixelAccumulator) {
         let task = self.prepared.task;
         for index in task.samples.begin..task.samples.end {
-            let [dx, dy] = task.sampler.position(pixel, index);
-            self.sample([f64::from(pixel[0]) + dx, f64::from(pixel[1]) + dy], out);
+            self.sample(&task.sampler.sample(pixel, index), out);
         }
     }
 
@@ -204,9 +204,9 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
         }
     }
 
-    fn sample(&mut self, raster: [f64; 2], out: &mut PixelAccumulator) {
+    fn sample(&mut self, place: &CameraSample, out: &mut PixelAccumulator) {
         let Prepared { task, follower, media, .. } = self.prepared;
-        let start = task.camera.ray(raster[0], raster[1]);
+        let start = task.camera.ray(place);
         if !task.needs.chain {
             let first = follower.first_surface(&start, &mut self.counters);
             for (layer, &output) in self.prepared.outputs.iter().enumerate() {
@@ -237,11 +237,12 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
                 Output::HalfWidth => out.add(layer, scalar(sample.half_width())),
                 Output::Motion => out.add(layer, sample.visible_motion()),
                 Output::Motion2 => {
-                    let motion2 = sample.motion2(&start, follower.start_medium(media), &self.log, &mut self.counters);
+                    let motion2 =
+                        sample.motion2(&start, follower.start_medium(media, start.time), &self.log, &mut self.counters);
                     out.add(layer, motion2);
                 }
                 Output::Fetch(channel) => {
-                    let offset = self.fetch_offset(raster, &start, &sample, channel);
+                    let offset = self.fetch_offset(place, &start, &sample, channel);
                     out.add(layer, offset);
                 }
                 Output::Ior => {
@@ -313,12 +314,12 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
         }
     }
 
-    /// Exact displacement at a channel's wavelength as a fetch offset: what is seen at `raster` there, is seen at
-    /// `raster` + offset at the reference wavelength. Newton's method with the screen columns, started from the
+    /// Exact displacement at a channel's wavelength as a fetch offset: what is seen at `place` there, is seen at
+    /// `place` + offset at the reference wavelength. Newton's method with the screen columns, started from the
     /// first-order motion, until a step no longer changes the offset.
     fn fetch_offset(
         &mut self,
-        raster: [f64; 2],
+        place: &CameraSample,
         start: &RayStart,
         sample: &Sample<'_, C>,
         channel: usize,
@@ -342,7 +343,7 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
         let mut offset = sample.motion().map_or(DVec2::ZERO, |motion| -motion * delta);
         let mut last_step = f64::INFINITY;
         for _ in 0..MAX_STEPS {
-            let moved = task.camera.ray(raster[0] + offset.x, raster[1] - offset.y);
+            let moved = task.camera.ray(&place.moved(offset.x, -offset.y));
             self.counters.retraces += 1;
             let chain = follower.follow::<ScreenColumns>(&moved, media, Record::none(), &mut self.counters);
             if chain.interfaces != target.interfaces || chain.total_reflections != target.total_reflections {

@@ -35,10 +35,9 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
     let view = View::new(scene, camera.position);
     let media = Media::at(scene, plan.optics.reference, plan.optics.dispersion_scale)?;
     let follower = Follower::new(&view);
-    let [dx, dy] = Sampler::new(plan.samples.total, plan.seed)?.position(pixel, sample);
-    let raster = [f64::from(pixel[0]) + dx, f64::from(pixel[1]) + dy];
-    let start = camera.ray(raster[0], raster[1]);
-    let medium = follower.start_medium(&media);
+    let place = Sampler::new(plan.samples.total, plan.seed)?.sample(pixel, sample);
+    let start = camera.ray(&place);
+    let medium = follower.start_medium(&media, start.time);
     let (mut log, mut segments) = (Vec::new(), Vec::new());
     let record = Record { steps: Some(&mut log), segments: Some(&mut segments) };
     let chain: Chain<SecondOrderColumns> = follower.follow(&start, &media, record, &mut Counters::default());
@@ -100,7 +99,7 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
     Ok(json!({
         "pixel": pixel,
         "sample": sample,
-        "raster": raster,
+        "raster": place.raster,
         "wavelength_nm": plan.optics.reference.nanometers(),
         "camera": array(view.origin),
         "direction": array(start.direction),

@@ -52,6 +52,9 @@ pub struct Document {
     pub root: usize,
     /// Materials, referred to by index.
     pub materials: Vec<Material>,
+    /// Images, referred to by index.
+    #[serde(default)]
+    pub textures: Vec<Texture>,
     /// Cameras, referred to by index. The first is the default.
     pub cameras: Vec<Camera>,
     /// Render settings, products flattened.
@@ -63,6 +66,52 @@ pub struct Document {
     /// What the bridge left out for a reason that is no warning: reason → count (`invisible`, `purpose proxy`).
     #[serde(default)]
     pub skipped: BTreeMap<String, u64>,
+    /// A file that is looked up and missing or unreadable is an error; else a warning, and a default in its place.
+    #[serde(default)]
+    pub strict_assets: bool,
+}
+
+/// A file that the scene refers to: an image, a light's profile.
+///
+/// Files of the file system are named and read when something looks them up; what lies in a package or behind an asset
+/// resolver of a studio comes with the scene.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Asset {
+    /// The path as it was authored: what messages name.
+    pub path: String,
+    /// Absolute path of the file. Absent where `content` has what is in it, or where nothing was found.
+    #[serde(default)]
+    pub file: Option<String>,
+    /// Array u8 `[n]`: what is in the file. Several assets may name one array.
+    #[serde(default)]
+    pub content: Option<String>,
+}
+
+/// An image file, or several that are its tiles.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Texture {
+    /// The property that names it, for messages.
+    pub place: String,
+    /// The image. Of tiles the path with `<UDIM>`, neither file nor content.
+    pub asset: Asset,
+    /// The tiles that were found; empty for a single image.
+    #[serde(default)]
+    pub tiles: Vec<Tile>,
+    /// The `colorSpace` that is stated for it; empty if none is.
+    #[serde(default)]
+    pub color_space: String,
+}
+
+/// A tile of a texture.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tile {
+    /// 1001 + u + 10 v for the tile whose lower left corner is at (u, v).
+    pub number: u32,
+    /// Its image.
+    pub asset: Asset,
 }
 
 /// Stage metadata.
@@ -230,6 +279,12 @@ pub struct Mesh {
     /// Texture coordinates, f32 `[n, 2]`.
     #[serde(default)]
     pub uv: Option<Primvar>,
+    /// The name that the texture coordinates have as a primvar, without `primvars:`.
+    #[serde(default)]
+    pub uv_name: Option<String>,
+    /// Other primvars that materials look up, by name without `primvars:`: f32 `[n]` or `[n, k]` with k ≤ 4.
+    #[serde(default)]
+    pub primvars: BTreeMap<String, Primvar>,
     /// Faces with materials of their own. Faces in none have the placement's material.
     #[serde(default)]
     pub subsets: Vec<Subset>,
@@ -312,6 +367,10 @@ pub struct Placement {
     /// Materials of the mesh's subsets, in their order; shorter or `null`: the material above.
     #[serde(default)]
     pub subset_materials: Vec<Option<usize>>,
+    /// Constant primvars that materials look up, inherited ones included, where the mesh itself has none of the name: by
+    /// name without `primvars:`, one to four numbers.
+    #[serde(default)]
+    pub primvars: BTreeMap<String, Vec<f64>>,
     /// Lit and shaded from both sides; for glass the sides are decided by the normal alone.
     #[serde(default)]
     pub double_sided: bool,

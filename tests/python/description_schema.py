@@ -153,6 +153,13 @@ def _check_arrays(document, arrays):
                 assert primvar["interpolation"] in ("constant", "uniform", "varying", "vertex", "faceVarying")
         for subset in mesh.get("subsets", []):
             array(subset["faces"], np.int32, 1, where)
+    for index, texture in enumerate(document.get("textures", [])):
+        for asset in [texture["asset"], *(tile["asset"] for tile in texture.get("tiles", []))]:
+            name = asset.get("content")
+            assert name is None or asset.get("file") is None, f"textures[{index}]: both file and content"
+            # Textures of one file share what is in it.
+            if name is not None and name not in used:
+                array(name, np.uint8, 1, f"textures[{index}]")
     shared = set()
     for index, group in enumerate(document["groups"]):
         for instances in group.get("instances", []):

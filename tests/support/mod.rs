@@ -50,6 +50,8 @@ impl Stagehand {
             settings: Settings::default(),
             warnings: Default::default(),
             skipped: BTreeMap::new(),
+            textures: Vec::new(),
+            strict_assets: false,
         };
         Self { document, arrays: Arrays::new() }
     }
@@ -156,6 +158,8 @@ impl Stagehand {
             left_handed: false,
             normals: None,
             uv: None,
+            uv_name: None,
+            primvars: BTreeMap::new(),
             subsets: vec![],
         }));
         self.place(path, transform, material);
@@ -180,6 +184,7 @@ impl Stagehand {
             instance: None,
             material,
             subset_materials: vec![],
+            primvars: Default::default(),
             double_sided: false,
         });
     }

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Array", "ArrayTable", "Description", "Diagnostics"]
+__all__ = ["Array", "ArrayTable", "BrokenError", "Description", "Diagnostics"]
 
 Array = npt.NDArray[Any]
-"""A float32, float64 or int32 array of shape (n,) or (n, k); usually USD's own memory, read-only."""
+"""A float32, float64, int32 or uint8 array of shape (n,) or (n, k); usually USD's own memory, read-only."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,18 @@ class Description:
         return warnings
 
 
+class BrokenError(Exception):
+    """What one prim says and nobody can render: that prim is left out with a warning, and the rest is rendered.
+
+    Never for what was asked for by an option or by the render settings: without that there is no picture to show.
+    """
+
+    def __init__(self, place: str, problem: str) -> None:
+        super().__init__(f"{place}: {problem}")
+        self.place = place
+        self.problem = problem
+
+
 @dataclass
 class Diagnostics:
     """Warnings by first occurrence; the same kind and message are counted together, with their first few places."""
@@ -55,6 +67,10 @@ class Diagnostics:
         if len(warning["places"]) < self.EXAMPLES and place not in warning["places"]:
             warning["places"].append(place)
 
+    def leave_out(self, broken: BrokenError) -> None:
+        """Record that a prim is left out for what it says."""
+        self.warn("broken-prim", broken.place, f"{broken.problem}; it is left out")
+
     def skip(self, reason: str, count: int = 1) -> None:
         """Count prims or instances left out for ``reason``."""
         self.skipped[reason] = self.skipped.get(reason, 0) + count
@@ -73,6 +89,6 @@ class ArrayTable:
     def add(self, name: str, array: Array) -> str:
         """Store ``array`` and return its name."""
         assert name not in self.arrays, f"array {name} is stored twice"
-        assert array.dtype in (np.float32, np.float64, np.int32), f"array {name} is {array.dtype}"
+        assert array.dtype in (np.float32, np.float64, np.int32, np.uint8), f"array {name} is {array.dtype}"
         self.arrays[name] = array
         return name

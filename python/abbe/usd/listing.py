@@ -8,10 +8,12 @@ from typing import Any, Unpack
 from . import tokens
 from ._pxr import UsdGeom
 from .cameras import all_cameras, read_camera
+from .composition import quiet_usd
 from .description import Diagnostics
+from .metadata import stage_time
 from .reader import default_camera
 from .render import all_settings, find_settings, read_settings, token_list
-from .stage import Opening, open_stage, quiet_usd, source_name, stage_time
+from .stage import Opening, open_stage, source_name
 
 __all__ = ["CameraInfo", "ProductInfo", "SettingsInfo", "VarInfo", "cameras", "settings"]
 

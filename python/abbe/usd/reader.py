@@ -17,24 +17,18 @@ import numpy as np
 from ..errors import StageError, UsageError
 from . import tokens
 from ._pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+from .assets import AssetReader
 from .cameras import find_camera, framed_camera, read_camera
-from .description import Array, ArrayTable, Description, Diagnostics
+from .composition import composition_warnings, quiet_usd
+from .description import Array, ArrayTable, BrokenError, Description, Diagnostics
 from .geometry import ShapeReader
 from .instancers import InstancerReader
 from .lenses import is_lens
 from .materials import MaterialReader
+from .metadata import stage_metadata, stage_time
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
-from .stage import (
-    OpenedStage,
-    Opening,
-    composition_warnings,
-    open_stage,
-    quiet_usd,
-    source_name,
-    stage_metadata,
-    stage_time,
-)
+from .stage import OpenedStage, Opening, open_stage, source_name
 from .values import IDENTITY, is_finite, matrix, place, read
 
 __all__ = ["default_camera", "read_stage"]
@@ -127,6 +121,8 @@ class _Group:
     instances: list[dict[str, Any]] = field(default_factory=list)
 
 
+# The last column of an affine matrix.
+_AFFINE = [0.0, 0.0, 0.0, 1.0]
 # Deeper nesting of instancers than this nobody models, and Python's own stack would end soon after.
 _MAX_NESTING = 64
 
@@ -184,11 +180,15 @@ class _Walk:
             if kind is _Kind.INSTANCER:
                 # Its prototypes usually stand below it and are not drawn where they stand.
                 prims.PruneChildren()
-                self._instance(prim, source or prim, str(path), state, group)
-            elif kind is not _Kind.PASS_THROUGH:
-                self._visit(prim, source or prim, str(path), kind, state, group)
-            elif prim.IsModel():
-                self._check_draw_mode(prim, state)
+            try:
+                if kind is _Kind.INSTANCER:
+                    self._instance(prim, source or prim, str(path), state, group)
+                elif kind is not _Kind.PASS_THROUGH:
+                    self._visit(prim, source or prim, str(path), kind, state, group)
+                elif prim.IsModel():
+                    self._check_draw_mode(prim, state)
+            except BrokenError as broken:
+                self.diagnostics.leave_out(broken)
 
     def _instance(self, prim: Any, source: Any, path: str, state: _State, group: _Group) -> None:
         """Add what a point instancer shows to ``group``."""
@@ -230,17 +230,17 @@ class _Walk:
         index = self._group_by_prototype.get(key)
         if index is None:
             if len(self._open) == _MAX_NESTING:
-                raise StageError(
-                    f"{place(instancer)}: is nested in {_MAX_NESTING} others: instance what they come to, or bake it"
-                )
+                raise BrokenError(place(instancer), f"is nested in {_MAX_NESTING} others, which is too deep")
             index = self._group_by_prototype[key] = len(self.groups)
             group = _Group(str(root.GetPath()), root)
             self.groups.append(group)
             self._open.append(root)
             prims = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
             depth = root.GetPath().pathElementCount - 1
-            self._traverse(prims, prims, _State(True, purpose, None), depth, group)
-            self._open.pop()
+            try:
+                self._traverse(prims, prims, _State(True, purpose, None), depth, group)
+            finally:
+                self._open.pop()
         return index
 
     def _purpose_above(self, prim: Any) -> str | None:
@@ -261,7 +261,9 @@ class _Walk:
             relative, _ = self.transforms.ComputeRelativeTransform(prim, group.root)
             transform = matrix(relative)
         if not is_finite(transform):
-            raise StageError(f"{place(prim)}: its transform is not finite: correct its xformOps or its parents'")
+            raise BrokenError(place(prim), "its transform is not finite, so that it stands nowhere")
+        if transform[3::4] != _AFFINE:
+            raise BrokenError(place(prim), "its transform is projective, and only affine ones place geometry")
         return transform
 
     def _facts(self, prim: Any) -> _Facts:
@@ -467,6 +469,7 @@ def _read(
     settings_prim = find_settings(stage, render_settings, source, diagnostics)
     walk = _Walk(opened, time, _purposes(purposes, settings_prim), diagnostics)
     walk.run()
+    assets = AssetReader(stage, time)
     materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim))
     groups = walk.bind(materials)
 
@@ -500,12 +503,14 @@ def _read(
         "groups": groups,
         "root": 0,
         "materials": materials.materials,
+        "textures": assets.textures,
         "cameras": cameras,
         "settings": settings,
         "warnings": diagnostics.warnings(),
         "skipped": diagnostics.skipped,
+        "strict_assets": missing == "error",
     }
-    return Description(document, walk.arrays())
+    return Description(document, {**walk.arrays(), **assets.arrays})
 
 
 def _warn_of_motion(

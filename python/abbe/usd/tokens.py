@@ -86,6 +86,8 @@ FULL_PURPOSE: Final = "full"
 OUTPUTS_PREFIX: Final = "outputs:"
 INPUTS: Final = "inputs"
 INPUTS_PREFIX: Final = "inputs:"
+# Where in the name of an image the number of its tile stands.
+TILE_PATTERNS: Final = ("<UDIM>",)
 INFO: Final = "info"
 INFO_ID: Final = "info:id"
 SURFACE_OUTPUT: Final = "outputs:surface"

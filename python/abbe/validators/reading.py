@@ -17,10 +17,12 @@ from .. import _core
 from ..errors import AbbeError, StageError
 from ..usd import describe, tokens
 from ..usd._pxr import Sdf, Usd, UsdShade
+from ..usd.composition import quiet_usd
 from ..usd.description import Array, Description, Diagnostics
 from ..usd.materials import MaterialReader
+from ..usd.metadata import stage_metadata, stage_time
 from ..usd.render import all_settings, read_settings
-from ..usd.stage import OpenedStage, Opening, open_stage, quiet_usd, source_name, stage_metadata, stage_time
+from ..usd.stage import OpenedStage, Opening, open_stage, source_name
 from . import Finding, Severity
 
 __all__ = ["CompiledMaterial", "Reading", "Remark", "read", "shared_source"]
