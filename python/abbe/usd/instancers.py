@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import tokens
-from ._pxr import UsdGeom
+from ._pxr import Tf, UsdGeom
+from .composition import usd_reason
 from .description import Array, ArrayTable, BrokenError, Diagnostics
 from .values import int_array, is_finite, matrix, place, read
 
@@ -191,7 +192,10 @@ class InstancerReader:
         xformable = UsdGeom.Xformable(root)
         if not xformable:
             return None
-        numbers = matrix(xformable.GetLocalTransformation(self._time))
+        try:
+            numbers = matrix(xformable.GetLocalTransformation(self._time))
+        except Tf.ErrorException as error:
+            raise BrokenError(place(root), f"USD cannot read its transform ({usd_reason(error)})") from None
         own = np.array(numbers).reshape(4, 4)
         if not is_finite(numbers):
             raise BrokenError(place(root), "its transform is not finite, so that its instances stand nowhere")

@@ -16,20 +16,21 @@ import numpy as np
 
 from ..errors import StageError, UsageError
 from . import tokens
-from ._pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+from ._pxr import Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 from .assets import AssetReader
 from .cameras import find_camera, framed_camera, read_camera
-from .composition import composition_warnings, quiet_usd
+from .composition import composition_warnings, quiet_usd, usd_reason
 from .description import Array, ArrayTable, BrokenError, Description, Diagnostics
 from .geometry import ShapeReader
 from .instancers import InstancerReader
 from .lenses import is_lens
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
+from .places import Places
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import OpenedStage, Opening, open_stage, source_name
-from .values import IDENTITY, is_finite, matrix, place, read
+from .values import IDENTITY, is_finite, place, read
 
 __all__ = ["default_camera", "read_stage"]
 
@@ -121,8 +122,6 @@ class _Group:
     instances: list[dict[str, Any]] = field(default_factory=list)
 
 
-# The last column of an affine matrix.
-_AFFINE = [0.0, 0.0, 0.0, 1.0]
 # Deeper nesting of instancers than this nobody models, and Python's own stack would end soon after.
 _MAX_NESTING = 64
 
@@ -135,7 +134,7 @@ class _Walk:
         self.time = time
         self.purposes = purposes
         self.diagnostics = diagnostics
-        self.transforms = UsdGeom.XformCache(time)
+        self.places = Places(time)
         self.shapes = ShapeReader(time, diagnostics)
         self._table = ArrayTable()
         self.instancers = InstancerReader(time, diagnostics, self._table)
@@ -189,6 +188,8 @@ class _Walk:
                     self._check_draw_mode(prim, state)
             except BrokenError as broken:
                 self.diagnostics.leave_out(broken)
+            except Tf.ErrorException as error:
+                self.diagnostics.leave_out(BrokenError(place(prim), f"USD cannot read it ({usd_reason(error)})"))
 
     def _instance(self, prim: Any, source: Any, path: str, state: _State, group: _Group) -> None:
         """Add what a point instancer shows to ``group``."""
@@ -255,16 +256,7 @@ class _Walk:
 
     def _transform(self, prim: Any, group: _Group) -> list[float]:
         """Return the matrix from a prim's space to its group's: the world's, or the prototype root's own."""
-        if group.root is None:
-            transform = matrix(self.transforms.GetLocalToWorldTransform(prim))
-        else:
-            relative, _ = self.transforms.ComputeRelativeTransform(prim, group.root)
-            transform = matrix(relative)
-        if not is_finite(transform):
-            raise BrokenError(place(prim), "its transform is not finite, so that it stands nowhere")
-        if transform[3::4] != _AFFINE:
-            raise BrokenError(place(prim), "its transform is projective, and only affine ones place geometry")
-        return transform
+        return self.places.of(prim, group.root)
 
     def _facts(self, prim: Any) -> _Facts:
         type_name = prim.GetTypeName()
@@ -479,7 +471,7 @@ def _read(
     def camera_index(prim: Any) -> int:
         if prim not in index_by_camera:
             index_by_camera[prim] = len(cameras)
-            cameras.append(read_camera(prim, time, walk.transforms))
+            cameras.append(read_camera(prim, time, walk.places.cache))
         return index_by_camera[prim]
 
     metadata = stage_metadata(opened, time_code, diagnostics)
