@@ -15,6 +15,7 @@
 //! | [`optics`] | n(λ) and its derivatives, absorption, media and their priorities |
 //! | [`ray`] | columns, transfer, scattering, footprint, chromatic motion: the calculus |
 //! | [`geometry`] | shapes, instances, trees, hits |
+//! | [`texture`] | images, colour spaces, what is computed of them |
 //! | [`camera`], [`sampler`] | where rays begin |
 //! | [`scene`] | the description, its checks, the compiled scene |
 //! | [`film`] | the AOV table, layers, sums independent of grouping |
@@ -41,5 +42,6 @@ pub mod render;
 pub mod sampler;
 pub mod scene;
 pub mod spectrum;
+pub mod texture;
 
 pub use error::{Error, Result};

@@ -11,6 +11,7 @@ const LAYERS: &[&[&str]] = &[
     &["optics"],
     &["ray"],
     &["geometry"],
+    &["texture"],
     &["sampler"],
     &["scene", "camera"],
     &["film"],

@@ -201,22 +201,24 @@ enum Outside {
     Same(MediaStack),
     /// The same for all rays that start in this box.
     SameWithin([DVec3; 2], MediaStack),
-    /// Different from ray to ray.
+    /// Different from ray to ray, in place or time.
     Different,
 }
 
 impl<'a> Follower<'a> {
-    /// For rays that start at the origin of `view` and see everything.
+    /// For rays that start at the camera of `view` and see everything.
     pub fn new(view: &'a View<'a>) -> Self {
-        Self { view, outside: Outside::Same(view.media_at(DVec3::ZERO)), unseen: None }
+        let outside =
+            if view.is_eye_passing_glass() { Outside::Different } else { Outside::Same(view.media_around_eye(0.0)) };
+        Self { view, outside, unseen: None }
     }
 
     /// For the rays of `camera`, whose position is the origin of `view`.
     pub fn of_camera(view: &'a View<'a>, camera: &Camera) -> Self {
         let outside = match camera.start_box() {
-            None => Outside::Same(view.media_at(DVec3::ZERO)),
+            None => Self::new(view).outside,
             Some(starts) if view.has_glass_in(starts) => Outside::Different,
-            Some(starts) => Outside::SameWithin(starts, view.media_at(0.5 * (starts[0] + starts[1]))),
+            Some(starts) => Outside::SameWithin(starts, view.media_at(0.5 * (starts[0] + starts[1]), 0.0)),
         };
         let clipping = match view.aggregate.bounds() {
             Some(bounds) if !camera.clipping().is_empty() => camera.clipping().of_box(bounds),
@@ -226,13 +228,12 @@ impl<'a> Follower<'a> {
         Self { view, outside, unseen }
     }
 
-    fn media_around(&self, start: DVec3) -> MediaStack {
+    fn media_around(&self, start: &RayStart) -> MediaStack {
+        let p = start.point;
         match &self.outside {
             Outside::Same(media) => media.clone(),
-            Outside::SameWithin([min, max], media) if min.cmple(start).all() && start.cmple(*max).all() => {
-                media.clone()
-            }
-            Outside::SameWithin(..) | Outside::Different => self.view.media_at(start),
+            Outside::SameWithin([min, max], media) if min.cmple(p).all() && p.cmple(*max).all() => media.clone(),
+            Outside::SameWithin(..) | Outside::Different => self.view.media_at(p, start.time),
         }
     }
 
@@ -411,8 +412,8 @@ impl<'a> Walk<'a> {
     fn new(follower: &Follower<'a>, start: &RayStart) -> Self {
         Self {
             view: follower.view,
-            ray: Ray { origin: start.point, direction: start.direction },
-            media: follower.media_around(start.point),
+            ray: Ray { origin: start.point, direction: start.direction, time: start.time },
+            media: follower.media_around(start),
             departures: Departures::none(),
             travelled: 0.0,
             crossings: 0,
@@ -470,7 +471,7 @@ impl<'a> Walk<'a> {
         if !met.hit.leaving || !self.view.is_in_contact(&met.hit) || !bounds_glass(&met.hit, met.material_id) {
             return met;
         }
-        let ahead = Ray { origin: met.point, direction: self.ray.direction };
+        let ahead = Ray { origin: met.point, ..self.ray };
         let mut departures = self.departures;
         departures.depart(&self.ray, &met.hit, true);
         for _ in 0..MAX_COINCIDENT {
@@ -500,7 +501,7 @@ impl<'a> Walk<'a> {
         if scattering.kind != ScatterKind::Refraction {
             self.departures.depart(&self.ray, &met.hit, !met.hit.leaving);
         }
-        self.ray = Ray { origin: met.point, direction: direction.normalize() };
+        self.ray = Ray { origin: met.point, direction: direction.normalize(), ..self.ray };
         (self.travelled, self.begin, self.sight) = (0.0, 0.0, None);
     }
 
@@ -564,7 +565,7 @@ impl<'a> Walk<'a> {
         let mut cluster = Cluster { media: self.media.clone(), departures: self.departures };
         let mut is_alone = true;
         self.include(&mut cluster, &met.hit, inside, counters);
-        let ahead = Ray { origin: met.point, direction: self.ray.direction };
+        let ahead = Ray { origin: met.point, ..self.ray };
         for _ in 0..MAX_COINCIDENT {
             counters.rays += 1;
             let Some(hit) = self.view.intersect(&ahead, &cluster.departures).filter(|hit| hit.at_start) else { break };

@@ -18,7 +18,8 @@ use super::{Counts, Scene};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::geometry::{
-    Buffer, InstanceArray, Interpolation, Mesh, MeshReport, NamedPrimvar, Part, PolygonMesh, PrimvarView, Shape, Sphere,
+    Buffer, Deformation, InstanceArray, Interpolation, Mesh, MeshReport, NamedPrimvar, Part, PolygonMesh, PrimvarView,
+    Shape, Sphere, are_increasing,
 };
 
 /// Checks and compiles `description`.
@@ -57,7 +58,7 @@ pub fn build(description: Description) -> Result<Scene> {
             Some(path) => instances.id(path, 1).ok_or_else(|| too_many(path))?,
         };
         let primvars = constants(single.placement, &primvars)?;
-        let world_from_object = single.transform;
+        let world_from_object = single.transform.clone();
         objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars, appearance });
     }
     let prototypes = prototypes
@@ -67,7 +68,7 @@ pub fn build(description: Description) -> Result<Scene> {
             for part in placed {
                 let Some((shape, part_ids)) = compiler.part(part, &mut diagnostics)? else { continue };
                 let part_ids = PartIds { primvars: constants(part.placement, &primvars)?, ..part_ids };
-                parts.push(Part { shape, place_from_object: part.transform });
+                parts.push(Part { shape, place_from_object: part.transform.clone() });
                 ids.push(part_ids);
             }
             Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids)))
@@ -75,8 +76,12 @@ pub fn build(description: Description) -> Result<Scene> {
         .collect::<Result<Vec<_>>>()?;
     let arrays = arrays.into_iter().filter_map(|array| {
         let (parts, ids) = &prototypes[array.prototype];
-        let instances =
-            InstanceArray { parts: Arc::clone(parts), places: array.places, world_from_array: array.transform };
+        let instances = InstanceArray {
+            parts: Arc::clone(parts),
+            places: array.places,
+            motion: array.motion,
+            world_from_array: array.transform,
+        };
         let parts = Arc::clone(ids);
         let placed = ObjectArray { instances, parts, first_id: array.first_id, indices: array.indices };
         (!placed.instances.is_empty()).then_some(placed)
@@ -198,14 +203,23 @@ fn build_shapes(
         .collect();
     let mut shapes = Vec::with_capacity(built.len());
     for (shape, result) in description.document.shapes.iter().zip(built) {
-        let Some((compiled, report)) = result? else {
+        let Some(built) = result? else {
             shapes.push(None);
             continue;
         };
-        let Some(compiled) = compiled else {
-            diagnostics.warn("empty-shape", shape.path(), "a size is 0, so that nothing of it is seen: it is left out");
-            shapes.push(None);
-            continue;
+        let (compiled, report) = match built {
+            Built::Shape(compiled, report) => (compiled, report),
+            Built::Nothing => {
+                let problem = "a size is 0, so that nothing of it is seen: it is left out";
+                diagnostics.warn("empty-shape", shape.path(), problem);
+                shapes.push(None);
+                continue;
+            }
+            Built::Broken { place, problem } => {
+                diagnostics.warn("broken-shape", place, format!("{problem}; the shape is left out"));
+                shapes.push(None);
+                continue;
+            }
         };
         if let (description::Shape::Mesh(mesh), Some(report)) = (shape, &report) {
             report_mesh(mesh, report, diagnostics);
@@ -243,18 +257,35 @@ fn report_mesh(mesh: &description::Mesh, report: &MeshReport, diagnostics: &mut 
     }
 }
 
-/// The shape, `None` if there is nothing of it; meshes with their report.
-fn build_shape(
-    description: &Description,
-    shape: &description::Shape,
-    names: &[String],
-) -> Result<(Option<Arc<Shape>>, Option<MeshReport>)> {
+/// What became of a shape.
+enum Built {
+    /// Meshes have a report.
+    Shape(Arc<Shape>, Option<MeshReport>),
+    /// A size is 0.
+    Nothing,
+    /// What the stage says of it is no shape. It is left out, and the rest of the picture kept.
+    Broken { place: String, problem: String },
+}
+
+/// Compiles a shape. What the stage got wrong is no error but [`Built::Broken`]; arrays that the document names and the
+/// description lacks are damage to the description itself, and an error.
+fn build_shape(description: &Description, shape: &description::Shape, names: &[String]) -> Result<Built> {
+    match compile_shape(description, shape, names)? {
+        Ok(built) => Ok(built),
+        Err(Error::Scene { place, problem }) => Ok(Built::Broken { place, problem }),
+        Err(other) => Err(other),
+    }
+}
+
+/// The outer error is the description's, the inner the stage's.
+fn compile_shape(description: &Description, shape: &description::Shape, names: &[String]) -> Result<Result<Built>> {
+    let solid = |shape: Option<Shape>| shape.map_or(Built::Nothing, |shape| Built::Shape(Arc::new(shape), None));
     match shape {
+        description::Shape::Sphere { radius: 0.0, .. } => Ok(Ok(Built::Nothing)),
         description::Shape::Sphere { path, radius } => {
-            let sphere = Sphere::new(*radius).ok_or_else(|| {
+            Ok(Sphere::new(*radius).map(|sphere| solid(Some(Shape::Sphere(sphere)))).ok_or_else(|| {
                 Error::scene(format!("{path}.radius"), format!("is {radius}: it must be positive and finite"))
-            })?;
-            Ok((Some(Arc::new(Shape::Sphere(sphere))), None))
+            }))
         }
         description::Shape::Mesh(mesh) => {
             let arrays = NamedArrays { description, place: &mesh.path };
@@ -279,10 +310,18 @@ fn build_shape(
                 primvars: names.iter().map(|name| arrays.named_primvar(mesh, name)).collect::<Result<_>>()?,
                 subsets: &subsets,
             };
-            let (compiled, report) = Mesh::from_polygons(&polygons)?;
-            Ok((Some(Arc::new(Shape::Mesh(compiled))), Some(report)))
+            let normals = polygons.normals.as_ref().map(|normals| normals.values.len());
+            let deformation = match &mesh.motion {
+                Some(motion) => match arrays.deformation(motion, polygons.points.len(), normals)? {
+                    Ok(deformation) => Some(deformation),
+                    Err(problem) => return Ok(Err(problem)),
+                },
+                None => None,
+            };
+            let mesh = Mesh::deforming(&polygons, deformation);
+            Ok(mesh.map(|(mesh, report)| Built::Shape(Arc::new(Shape::Mesh(mesh)), Some(report))))
         }
-        solid => Ok((solids::compile(solid)?.map(|solid| Arc::new(Shape::Solid(solid))), None)),
+        other => Ok(solids::compile(other).map(|compiled| solid(compiled.map(Shape::Solid)))),
     }
 }
 
@@ -338,6 +377,37 @@ impl<'a> NamedArrays<'a> {
         let array = self.get(name, element, columns)?;
         Buffer::new(array.bytes.clone())
             .map_err(|problem| Error::scene(self.place, format!("array '{name}': {problem}")))
+    }
+
+    /// Points and normals at other times: of a mesh with so many points, and floats in its normals. What is only broken (not
+    /// what is missing from the file) is the inner error.
+    fn deformation(
+        &self,
+        motion: &description::MeshMotion,
+        points: usize,
+        normals: Option<usize>,
+    ) -> Result<Result<Deformation>> {
+        let description::MeshMotion { times, points: names, normals: normal_names } = motion;
+        let broken = |problem: &str| Ok(Err(Error::scene(self.place, problem)));
+        if !are_increasing(times) || times.len() > unroll::MAX_TIMES {
+            return broken("the times of its motion do not increase");
+        }
+        if names.len() != times.len() || ![0, times.len()].contains(&normal_names.len()) {
+            return broken("its motion needs points, and normals if any, for each of its times");
+        }
+        let moved: Vec<Buffer<[f32; 3]>> = names.iter().map(|name| self.buffer(name, 3)).collect::<Result<_>>()?;
+        if moved.iter().any(|moved| moved.len() != points) {
+            return broken("its motion has another number of points at another time");
+        }
+        if moved.par_iter().any(|moved| moved.iter().flatten().any(|v| !v.is_finite())) {
+            return broken("its motion has a point that is not finite");
+        }
+        let turned: Vec<Buffer<f32>> = normal_names.iter().map(|name| self.buffer(name, 3)).collect::<Result<_>>()?;
+        if turned.iter().any(|turned| Some(turned.len()) != normals) {
+            return broken("its motion has another number of normals at another time");
+        }
+        let normals = (!turned.is_empty()).then_some(turned);
+        Ok(Ok(Deformation { times: times.clone(), points: moved, normals }))
     }
 
     fn integers(&self, name: &str) -> Result<&'a [i32]> {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 
-use crate::geometry::{Buffer, Instance, InstanceArray, Location, Numbering, Shape};
+use crate::geometry::{Buffer, Instance, InstanceArray, Location, Numbering, Pose, Shape};
 
 /// A placed shape.
 #[derive(Clone, Debug)]
@@ -12,7 +12,7 @@ pub struct Object {
     /// The shape, shared between its placements.
     pub shape: Arc<Shape>,
     /// Stage world from object space.
-    pub world_from_object: DAffine3,
+    pub world_from_object: Pose,
     /// `prim_id`: 1-based index into [`Scene::prims`](super::Scene::prims).
     pub prim_id: u32,
     /// `instance_id`: what [`Scene::instances`](super::Scene::instances) counts, 0 for none.
@@ -123,9 +123,37 @@ impl Objects {
     }
 
     /// What [`Aggregate::with_arrays`](crate::geometry::Aggregate::with_arrays) takes; it numbers the same way.
-    pub(super) fn instances(&self) -> (Vec<Instance>, Vec<InstanceArray>) {
-        let single = |o: &Object| Instance { shape: Arc::clone(&o.shape), world_from_object: o.world_from_object };
-        (self.singles.iter().map(single).collect(), self.arrays.iter().map(|a| a.instances.clone()).collect())
+    /// Without motion unless it `moves`.
+    pub(super) fn instances(&self, moves: bool) -> (Vec<Instance>, Vec<InstanceArray>) {
+        let pose = |pose: &Pose| if moves { pose.clone() } else { pose.held() };
+        let single =
+            |o: &Object| Instance { shape: Arc::clone(&o.shape), world_from_object: pose(&o.world_from_object) };
+        let array = |a: &ObjectArray| if moves { a.instances.clone() } else { a.instances.held() };
+        (self.singles.iter().map(single).collect(), self.arrays.iter().map(array).collect())
+    }
+
+    /// Whether anything moves: places, or points of shapes.
+    pub fn is_moving(&self) -> bool {
+        let deforms = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.is_deforming());
+        self.singles.iter().any(|o| o.world_from_object.is_moving() || deforms(&o.shape))
+            || self
+                .arrays
+                .iter()
+                .any(|a| a.instances.is_moving() || a.instances.parts.iter().any(|p| deforms(&p.shape)))
+    }
+
+    /// Where the object `index` is at a time, and its shape.
+    pub fn placed(&self, index: u32, time: f64) -> (&Shape, DAffine3) {
+        match self.numbering.locate(index) {
+            Location::Single(i) => {
+                let object = &self.singles[i];
+                (&object.shape, object.world_from_object.at(time))
+            }
+            Location::InArray { array, place, part } => {
+                let instances = &self.arrays[array].instances;
+                (&instances.parts[part].shape, instances.world_from_object(place, part, time))
+            }
+        }
     }
 
     /// The constant primvar with a number of the object `index`.

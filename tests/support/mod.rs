@@ -41,6 +41,7 @@ impl Stagehand {
                 up_axis: "Y".into(),
                 time_code: None,
                 frames_per_second: Some(24.0),
+                motion: None,
             },
             shapes: vec![],
             groups: vec![Group { path: "/".into(), items: vec![], instances: vec![] }],
@@ -161,6 +162,7 @@ impl Stagehand {
             uv_name: None,
             primvars: BTreeMap::new(),
             subsets: vec![],
+            motion: None,
         }));
         self.place(path, transform, material);
     }
@@ -181,6 +183,7 @@ impl Stagehand {
             path: path.into(),
             target: Target::Shape(shape),
             transform: Some(transform.to_cols_array()),
+            motion: None,
             instance: None,
             material,
             subset_materials: vec![],

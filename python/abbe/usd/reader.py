@@ -16,20 +16,21 @@ import numpy as np
 
 from ..errors import StageError, UsageError
 from . import tokens
-from ._pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+from ._pxr import Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 from .assets import AssetReader
 from .cameras import find_camera, framed_camera, read_camera
-from .composition import composition_warnings, quiet_usd
-from .description import Array, ArrayTable, Description, Diagnostics
+from .composition import composition_warnings, quiet_usd, usd_reason
+from .description import Array, ArrayTable, BrokenError, Description, Diagnostics
 from .geometry import ShapeReader
 from .instancers import InstancerReader
 from .lenses import is_lens
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
+from .places import Places
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import OpenedStage, Opening, open_stage, source_name
-from .values import IDENTITY, is_finite, matrix, place, read
+from .values import IDENTITY, is_finite, place, read
 
 __all__ = ["default_camera", "read_stage"]
 
@@ -133,7 +134,7 @@ class _Walk:
         self.time = time
         self.purposes = purposes
         self.diagnostics = diagnostics
-        self.transforms = UsdGeom.XformCache(time)
+        self.places = Places(time)
         self.shapes = ShapeReader(time, diagnostics)
         self._table = ArrayTable()
         self.instancers = InstancerReader(time, diagnostics, self._table)
@@ -141,6 +142,7 @@ class _Walk:
         self.cameras: list[Any] = []
         self._kinds: dict[str, _Kind] = {}
         self._facts_by_prim: dict[Any, _Facts] = {}
+        self._hidden: dict[tuple[Any, str], bool] = {}
         self._group_by_prototype: dict[tuple[Any, str | None], int] = {}
         # The prototypes around what is visited, innermost last.
         self._open: list[Any] = []
@@ -178,11 +180,17 @@ class _Walk:
             if kind is _Kind.INSTANCER:
                 # Its prototypes usually stand below it and are not drawn where they stand.
                 prims.PruneChildren()
-                self._instance(prim, source or prim, str(path), state, group)
-            elif kind is not _Kind.PASS_THROUGH:
-                self._visit(prim, source or prim, str(path), kind, state, group)
-            elif prim.IsModel():
-                self._check_draw_mode(prim, state)
+            try:
+                if kind is _Kind.INSTANCER:
+                    self._instance(prim, source or prim, str(path), state, group)
+                elif kind is not _Kind.PASS_THROUGH:
+                    self._visit(prim, source or prim, str(path), kind, state, group)
+                elif prim.IsModel():
+                    self._check_draw_mode(prim, state)
+            except BrokenError as broken:
+                self.diagnostics.leave_out(broken)
+            except Tf.ErrorException as error:
+                self.diagnostics.leave_out(BrokenError(place(prim), f"USD cannot read it ({usd_reason(error)})"))
 
     def _instance(self, prim: Any, source: Any, path: str, state: _State, group: _Group) -> None:
         """Add what a point instancer shows to ``group``."""
@@ -224,17 +232,17 @@ class _Walk:
         index = self._group_by_prototype.get(key)
         if index is None:
             if len(self._open) == _MAX_NESTING:
-                raise StageError(
-                    f"{place(instancer)}: is nested in {_MAX_NESTING} others: instance what they come to, or bake it"
-                )
+                raise BrokenError(place(instancer), f"is nested in {_MAX_NESTING} others, which is too deep")
             index = self._group_by_prototype[key] = len(self.groups)
             group = _Group(str(root.GetPath()), root)
             self.groups.append(group)
             self._open.append(root)
             prims = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
             depth = root.GetPath().pathElementCount - 1
-            self._traverse(prims, prims, _State(True, purpose, None), depth, group)
-            self._open.pop()
+            try:
+                self._traverse(prims, prims, _State(True, purpose, None), depth, group)
+            finally:
+                self._open.pop()
         return index
 
     def _purpose_above(self, prim: Any) -> str | None:
@@ -249,14 +257,7 @@ class _Walk:
 
     def _transform(self, prim: Any, group: _Group) -> list[float]:
         """Return the matrix from a prim's space to its group's: the world's, or the prototype root's own."""
-        if group.root is None:
-            transform = matrix(self.transforms.GetLocalToWorldTransform(prim))
-        else:
-            relative, _ = self.transforms.ComputeRelativeTransform(prim, group.root)
-            transform = matrix(relative)
-        if not is_finite(transform):
-            raise StageError(f"{place(prim)}: its transform is not finite: correct its xformOps or its parents'")
-        return transform
+        return self.places.of(prim, group.root)
 
     def _facts(self, prim: Any) -> _Facts:
         type_name = prim.GetTypeName()
@@ -300,6 +301,9 @@ class _Walk:
         if purpose not in self.purposes:
             self.diagnostics.skip(f"purpose {purpose}")
             return
+        if purpose != tokens.DEFAULT and self._hides(prim, purpose):
+            self.diagnostics.skip("invisible")
+            return
         if kind is _Kind.MESH:
             self._place(prim, path, self.shapes.mesh(prim, source), state, group)
         elif kind is _Kind.SPHERE:
@@ -322,6 +326,27 @@ class _Walk:
             self.diagnostics.warn(
                 "unsupported-prim", place(prim), f"{prim.GetTypeName()} prims are not supported; they are left out"
             )
+
+    def _hides(self, prim: Any, purpose: str) -> bool:
+        """Whether the nearest authored visibility of a purpose, the prim's own or one above it, is invisible.
+
+        The fallback of guides is invisible too, but here they are shown only where somebody has asked for guides.
+        """
+        asked, is_hidden = [], False
+        while prim:
+            known = self._hidden.get((prim, purpose))
+            if known is not None:
+                is_hidden = known
+                break
+            asked.append((prim, purpose))
+            if prim.HasAPI(UsdGeom.VisibilityAPI):
+                attribute = prim.GetAttribute(purpose + tokens.PURPOSE_VISIBILITY)
+                if attribute and attribute.HasAuthoredValue():
+                    is_hidden = read(prim, attribute.GetName(), self.time) == tokens.INVISIBLE
+                    break
+            prim = prim.GetParent()
+        self._hidden.update((key, is_hidden) for key in asked)
+        return is_hidden
 
     def _check_draw_mode(self, prim: Any, state: _State) -> None:
         mode = read(prim, tokens.DRAW_MODE, self.time)
@@ -471,7 +496,7 @@ def _read(
     def camera_index(prim: Any) -> int:
         if prim not in index_by_camera:
             index_by_camera[prim] = len(cameras)
-            cameras.append(read_camera(prim, time, walk.transforms))
+            cameras.append(read_camera(prim, time, walk.places.cache))
         return index_by_camera[prim]
 
     metadata = stage_metadata(opened, time_code, diagnostics)
