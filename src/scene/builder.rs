@@ -12,14 +12,15 @@ use super::description::{self, Array, Description, Document, Element, Placement}
 use super::manifest::Manifest;
 use super::material::{self, Context, Material, ScalarIor};
 use super::meshes;
-use super::objects::{ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
+use super::objects::{Appearance, ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
 use super::solids;
 use super::unroll::{self, Placed, Unrolled};
 use super::{Counts, Scene};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::geometry::{
-    Buffer, InstanceArray, Interpolation, Mesh, MeshReport, NamedPrimvar, Part, PolygonMesh, PrimvarView, Shape, Sphere,
+    Buffer, Deformation, InstanceArray, Interpolation, Mesh, MeshReport, NamedPrimvar, Part, PolygonMesh, PrimvarView,
+    Shape, Sphere, are_increasing,
 };
 
 /// Checks and compiles `description`.
@@ -48,7 +49,9 @@ pub fn build(description: Description) -> Result<Scene> {
     };
     let mut objects = Vec::with_capacity(singles.len());
     for single in &singles {
-        let Some((shape, PartIds { prim_id, material_ids, .. })) = compiler.part(single, &mut diagnostics)? else {
+        let Some((shape, PartIds { prim_id, material_ids, appearance, .. })) =
+            compiler.part(single, &mut diagnostics)?
+        else {
             continue;
         };
         let instance_id = match single.instance {
@@ -56,8 +59,8 @@ pub fn build(description: Description) -> Result<Scene> {
             Some(path) => instances.id(path, 1).ok_or_else(|| too_many(path))?,
         };
         let primvars = constants(single.placement, &primvars)?;
-        let world_from_object = single.transform.into();
-        objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars });
+        let world_from_object = single.transform.clone();
+        objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars, appearance });
     }
     let prototypes = prototypes
         .iter()
@@ -66,7 +69,7 @@ pub fn build(description: Description) -> Result<Scene> {
             for part in placed {
                 let Some((shape, part_ids)) = compiler.part(part, &mut diagnostics)? else { continue };
                 let part_ids = PartIds { primvars: constants(part.placement, &primvars)?, ..part_ids };
-                parts.push(Part { shape, place_from_object: part.transform.into() });
+                parts.push(Part { shape, place_from_object: part.transform.clone() });
                 ids.push(part_ids);
             }
             Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids)))
@@ -77,8 +80,8 @@ pub fn build(description: Description) -> Result<Scene> {
         let instances = InstanceArray {
             parts: Arc::clone(parts),
             places: array.places,
-            motion: None,
-            world_from_array: array.transform.into(),
+            motion: array.motion,
+            world_from_array: array.transform,
         };
         let parts = Arc::clone(ids);
         let placed = ObjectArray { instances, parts, first_id: array.first_id, indices: array.indices };
@@ -156,7 +159,9 @@ impl Compiler<'_> {
             self.triangles += report.triangles;
         }
         let material_ids = self.slots.entry(list).or_insert_with_key(|list| list.as_slice().into()).clone();
-        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids, primvars: None })))
+        let &Placement { hidden_from_camera, matte, .. } = placement;
+        let appearance = Appearance { hidden_from_camera, matte };
+        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids, primvars: None, appearance })))
     }
 }
 
@@ -294,7 +299,15 @@ fn compile_shape(description: &Description, shape: &description::Shape, names: &
                 subsets: &subsets,
                 subdivision: meshes::subdivision(&arrays, mesh, counts)?,
             };
-            let mesh = Mesh::from_polygons(&polygons);
+            let normals = polygons.normals.as_ref().map(|normals| normals.values.len());
+            let deformation = match &mesh.motion {
+                Some(motion) => match arrays.deformation(motion, polygons.points.len(), normals)? {
+                    Ok(deformation) => Some(deformation),
+                    Err(problem) => return Ok(Err(problem)),
+                },
+                None => None,
+            };
+            let mesh = Mesh::deforming(&polygons, deformation);
             Ok(mesh.map(|(mesh, report)| Built::Shape(Arc::new(Shape::Mesh(mesh)), Some(report))))
         }
         other => Ok(solids::compile(other).map(|compiled| solid(compiled.map(Shape::Solid)))),
@@ -353,6 +366,37 @@ impl<'a> NamedArrays<'a> {
         let array = self.get(name, element, columns)?;
         Buffer::new(array.bytes.clone())
             .map_err(|problem| Error::scene(self.place, format!("array '{name}': {problem}")))
+    }
+
+    /// Points and normals at other times: of a mesh with so many points, and floats in its normals. What is only broken (not
+    /// what is missing from the file) is the inner error.
+    fn deformation(
+        &self,
+        motion: &description::MeshMotion,
+        points: usize,
+        normals: Option<usize>,
+    ) -> Result<Result<Deformation>> {
+        let description::MeshMotion { times, points: names, normals: normal_names } = motion;
+        let broken = |problem: &str| Ok(Err(Error::scene(self.place, problem)));
+        if !are_increasing(times) || times.len() > unroll::MAX_TIMES {
+            return broken("the times of its motion do not increase");
+        }
+        if names.len() != times.len() || ![0, times.len()].contains(&normal_names.len()) {
+            return broken("its motion needs points, and normals if any, for each of its times");
+        }
+        let moved: Vec<Buffer<[f32; 3]>> = names.iter().map(|name| self.buffer(name, 3)).collect::<Result<_>>()?;
+        if moved.iter().any(|moved| moved.len() != points) {
+            return broken("its motion has another number of points at another time");
+        }
+        if moved.par_iter().any(|moved| moved.iter().flatten().any(|v| !v.is_finite())) {
+            return broken("its motion has a point that is not finite");
+        }
+        let turned: Vec<Buffer<f32>> = normal_names.iter().map(|name| self.buffer(name, 3)).collect::<Result<_>>()?;
+        if turned.iter().any(|turned| Some(turned.len()) != normals) {
+            return broken("its motion has another number of normals at another time");
+        }
+        let normals = (!turned.is_empty()).then_some(turned);
+        Ok(Ok(Deformation { times: times.clone(), points: moved, normals }))
     }
 
     pub(super) fn integers(&self, name: &str) -> Result<&'a [i32]> {

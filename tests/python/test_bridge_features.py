@@ -247,6 +247,52 @@ def test_every_kind_of_op_is_as_usd_computes_it(value, order):
     assert_agrees(in_memory(text), {"/X/S"})
 
 
+# Visibility
+
+
+def test_visibility_of_purposes():
+    """The nearest authored opinion decides, as in USD; guides that were asked for need none."""
+    api = '(\n prepend apiSchemas = ["VisibilityAPI"]\n)\n{\n'
+    kinds = "".join(
+        f'def Sphere "{purpose}"\n{{\n uniform token purpose = "{purpose}"\n}}\n'
+        for purpose in ("default", "render", "proxy", "guide")
+    )
+    text = f"""def Xform "Plain"
+{{
+{kinds}}}
+def Xform "Hidden" {api} uniform token renderVisibility = "invisible"
+ uniform token proxyVisibility = "invisible"
+ uniform token guideVisibility = "invisible"
+{kinds} def Xform "Shown" {api}  uniform token renderVisibility = "visible"
+  uniform token guideVisibility = "inherited"
+{kinds} }}
+}}
+def Xform "Unsaid" {api}{kinds}}}
+"""
+    stage = in_memory(text)
+    shown = set(placed(checked(stage, purposes=["render", "proxy", "guide"])))
+    for prim in stage.Traverse():
+        if not prim.IsA(UsdGeom.Sphere):
+            continue
+        imageable = UsdGeom.Imageable(prim)
+        purpose = imageable.ComputePurpose()
+        effective = imageable.ComputeEffectiveVisibility(purpose)
+        authored = any(
+            prim.GetStage().GetAttributeAtPath(path.AppendProperty(f"{purpose}Visibility")).HasAuthoredValue()
+            for path in prim.GetPath().GetPrefixes()
+            if prim.GetStage().GetPrimAtPath(path).HasAPI(UsdGeom.VisibilityAPI) and purpose != "default"
+        )
+        # Where nothing is authored USD has a fallback for guides.
+        expected = effective != "invisible" or not authored
+        assert (str(prim.GetPath()) in shown) == expected, prim
+    assert {path for path in shown if path.startswith("/Hidden")} == {
+        "/Hidden/default",
+        "/Hidden/Shown/default",
+        "/Hidden/Shown/render",
+        "/Hidden/Shown/guide",
+    }
+
+
 # What is left out
 
 
@@ -279,3 +325,55 @@ def test_what_is_not_rendered_is_named_once_with_places_and_a_count(name):
     assert warning["count"] == 7
     assert warning["places"] == [f"</P{i}>" for i in range(5)]
     assert warning["message"] == f"{name} prims are not supported; they are left out"
+
+
+def test_what_is_posed_is_rendered_as_authored():
+    text = """def SkelRoot "Root" (
+ prepend apiSchemas = ["SkelBindingAPI"]
+)
+{
+ rel skel:skeleton = </Root/Skeleton>
+ def Skeleton "Skeleton"
+ {
+  uniform token[] joints = ["A"]
+ }
+ def SkelAnimation "Animation"
+ {
+ }
+ def Mesh "Skin"
+ {
+  uniform token subdivisionScheme = "none"
+  point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+  int[] faceVertexCounts = [3]
+  int[] faceVertexIndices = [0, 1, 2]
+  def BlendShape "Smile"
+  {
+   vector3f[] offsets = [(0, 0, 1), (0, 0, 1), (0, 0, 1)]
+  }
+ }
+}
+"""
+    description = checked(in_memory(text))
+    assert set(placed(description)) == {"/Root/Skin"}
+    warnings = [warning for warning in description.warnings if warning["kind"] == "unsupported-prim"]
+    assert [(warning["places"], warning["count"]) for warning in warnings] == [(["</Root>"], 1)]
+    assert "skinning is not supported" in warnings[0]["message"]
+
+
+def test_what_has_no_effect_changes_nothing():
+    plain = 'def Camera "C"\n{\n}\ndef Sphere "S"\n{\n}\n'
+    decorated = """def Camera "C" (
+ prepend apiSchemas = ["ListAPI", "LightListAPI", "CoordSysAPI:here"]
+)
+{
+ rel lightList = </S>
+ token lightList:cacheBehavior = "consumeAndContinue"
+ rel coordSys:here:binding = </C>
+}
+def Sphere "S"
+{
+ float3[] extent = [(-9, -9, -9), (9, 9, 9)]
+}
+"""
+    with_extent, without = checked(in_memory(decorated)), checked(in_memory(plain))
+    assert with_extent.document == without.document
