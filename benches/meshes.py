@@ -3,9 +3,9 @@
     python benches/meshes.py [TRIANGLES]
 
 One wavy sheet of so many triangles (ten million unless given) three ways: as authored, with normals and texture
-coordinates at every corner, and as the subdivision surface of a control mesh sixteen times coarser. Memory is that of the
-whole process, less what it was with `abbe` and USD imported: at its peak, and "kept" when the tree is built and the stage
-is closed.
+coordinates at every corner, and as the subdivision surface of a control mesh sixteen times coarser. Memory is that of
+the whole process, less what it was with `abbe` and USD imported: at its peak, and "kept" when the tree is built and the
+stage is closed.
 """
 
 from __future__ import annotations
@@ -76,7 +76,8 @@ def measure(path: str) -> None:
     from abbe.usd import describe
 
     def usd_alone() -> None:
-        mesh = UsdGeom.Mesh(Usd.Stage.Open(path).GetPrimAtPath("/Sheet"))
+        stage = Usd.Stage.Open(path)
+        mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/Sheet"))
         primvars = [primvar.GetAttr() for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvars()]
         for attribute in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr(), *primvars):
             attribute.Get()

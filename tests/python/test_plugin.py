@@ -61,7 +61,7 @@ SCHEMAS = {
             "abbe:lens:back:semiDiameter": ("double", VARYING, 0.0, None),
         },
     ),
-    "AbbeSubdivisionAPI": ("Mesh", {"abbe:subdivision:level": ("int", UNIFORM, 2, None)}),
+    "AbbeSubdivisionAPI": ("Mesh", {"abbe:subdivision:level": ("int", UNIFORM, -1, None)}),
     "AbbeRenderSettingsAPI": (
         "RenderSettings",
         {

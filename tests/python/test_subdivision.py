@@ -80,6 +80,10 @@ def seen_through(make, **options):
     prim = make(stage)
     material = UsdShade.Material.Define(stage, "/Glass")
     material.GetPrim().CreateAttribute("abbe:glass", Sdf.ValueTypeNames.String).Set("SCHOTT:N-BK7")
+    shader = UsdShade.Shader.Define(stage, "/Glass/Shader")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(0.0)
+    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
     UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
     wall = UsdGeom.Plane.Define(stage, "/Wall")
     wall.CreateWidthAttr(20.0)
@@ -103,11 +107,13 @@ def test_dispersion_through_a_subdivided_lens_tends_to_that_of_its_surface():
         for name in ("dposition_dlambda", "ddirection_dlambda", "dispersion"):
             difference = np.linalg.norm(film[name] - exact[name], axis=2).max()
             errors.setdefault(name, []).append(difference / np.linalg.norm(exact[name], axis=2).max())
-    print(errors)
     for name, (first, second, third) in errors.items():
-        # Linear interpolation of normals and points errs with the square of the size of the faces.
-        assert 3.0 < first / second < 5.5 and 3.0 < second / third < 5.5, (name, errors)
-        assert second < 0.01, "the level that nobody has to ask for"
+        # Linear interpolation of points and normals errs with the square of the size of the faces; its derivative,
+        # which bends the pixel's own footprint and so enters the motion on screen, with the size itself.
+        low, high = (1.5, 4.5) if name == "dispersion" else (3.0, 5.5)
+        assert low < first / second < high and low < second / third < high, (name, errors)
+        # At the level that nobody has to ask for, with ten faces across.
+        assert second < (4e-3 if name == "dispersion" else 2e-4), (name, errors)
 
 
 def triangles_of(stage, **options):
@@ -115,20 +121,24 @@ def triangles_of(stage, **options):
     return film.statistics["scene"]["triangles"]
 
 
-def test_the_level_is_that_of_the_mesh_then_what_is_asked_then_two():
-    def triangles(complexity=None, level=None):
+def test_the_level_is_that_of_the_mesh_then_what_is_asked_then_by_size():
+    def triangles(complexity=None, level=None, n=4):
         stage = Usd.Stage.CreateInMemory()
-        prim = lens_cage(stage, 4)
+        prim = lens_cage(stage, n)
         if level is not None:
             prim.CreateAttribute("abbe:subdivision:level", Sdf.ValueTypeNames.Int).Set(level)
         return triangles_of(stage, complexity=complexity)
 
     faces = 2 * 16 + 16
-    assert triangles() == 32 * faces
+    # Coarse ones are refined more.
+    assert triangles(n=1) == 2 * 4**4 * 6
+    assert triangles() == triangles(level=-1) == 128 * faces
+    assert triangles(n=8) == 32 * (2 * 64 + 32)
     assert triangles("low") == 2 * faces
     assert triangles("medium") == 8 * faces
     assert triangles("veryhigh") == 128 * faces
     assert triangles("low", level=3) == 128 * faces
+    assert triangles("high", level=-1) == 32 * faces
     assert triangles("high", level=0) == 2 * faces
     with pytest.raises(UsageError, match="complexity 'extreme': use one of low, medium"):
         describe(in_memory(""), complexity="extreme")
@@ -190,7 +200,7 @@ def test_all_that_usd_says_of_a_subdivision_surface_crosses():
         ('token subdivisionScheme = "loop"', "unusable-attribute", "face 0 has 4 corners, and Loop's scheme"),
         ('token interpolateBoundary = "some"', "unreadable-attribute", "'some' is none of none, edgeOnly"),
         ('token subdivisionScheme = "soft"', "unreadable-attribute", "'soft' is no scheme of USD"),
-        ('int abbe:subdivision:level = -1', "unreadable-attribute", "-1 is no number of levels"),
+        ("float abbe:subdivision:level = 1.5", "unreadable-attribute", "1.5 is no number of levels"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_left_out_and_named(line, kind, message):
@@ -244,12 +254,13 @@ MIDDLE = (12 + 8 * 0.75 + 16 * (5 / 9 + 0.75 + 0.75 + 1) / 4) / 36
         # A hole supports what is around it: one looks through to the bottom.
         ("int[] holeIndices = [1]", -MIDDLE),
         ("int abbe:subdivision:level = 0", 1.0),
+        ("int abbe:subdivision:level = -1", MIDDLE),
         ("int abbe:subdivision:level = 5", MIDDLE),
     ],
 )  # fmt: skip
 def test_the_middle_of_a_cube_is_where_its_limit_is(lines, height):
-    # A quarter of a millimetre off the axis: no ray through a vertex.
-    assert depth_along_z(CUBE % lines, 1e-4, 2e-4) == pytest.approx(height, abs=1e-6)
+    # The ray meets a vertex; depths of 10 have six digits after the point in float32.
+    assert depth_along_z(CUBE % lines, 0, 0) == pytest.approx(height, abs=2e-6)
 
 
 def test_faces_of_a_subset_keep_their_material_when_refined():

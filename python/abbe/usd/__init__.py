@@ -55,7 +55,7 @@ def describe(
     payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
     missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
     complexity : ``"low"``, ``"medium"``, ``"high"`` or ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
-        ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
+        ``abbe:subdivision:level`` of a mesh counts first; by its size if None, 2 for most
     scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
     strict : a stage without a camera is an error
 
