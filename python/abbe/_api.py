@@ -52,6 +52,7 @@ class Options(TypedDict, total=False):
     width: int | None
     height: int | None
     samples: int | None
+    depth_of_field: bool | None
     integrator: str | None
     aovs: Sequence[str] | None
     wavelength: float | None
@@ -136,6 +137,7 @@ class Scene:
         frame: float | Literal["default"] | None = None,
         camera: str | None = None,
         render_settings: str | None = None,
+        render_pass: str | None = None,
         product: str | None = None,
         purposes: Sequence[str] | None = None,
         variants: Sequence[str] = (),
@@ -156,6 +158,7 @@ class Scene:
         frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
         camera : path of a Camera, or the name of the first such; it then replaces the cameras that products name
         render_settings : path of a RenderSettings prim; the stage's own if None
+        render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
         product : path or name of the one RenderProduct to keep
         purposes : of default, render, proxy, guide; the settings', else default and render, if None
         variants : selections such as ``"/World/Ball{material=glass}"``
@@ -189,6 +192,7 @@ class Scene:
             frame=frame,
             camera=camera,
             render_settings=render_settings,
+            render_pass=render_pass,
             product=product,
             purposes=purposes,
             variants=variants,
@@ -395,10 +399,12 @@ def render(
     frame: float | Literal["default"] | None = None,
     camera: str | None = None,
     render_settings: str | None = None,
+    render_pass: str | None = None,
     product: str | None = None,
     width: int | None = None,
     height: int | None = None,
     samples: int | None = None,
+    depth_of_field: bool | None = None,
     integrator: str | None = None,
     aovs: Sequence[str] | None = None,
     wavelength: float | None = None,
@@ -431,9 +437,11 @@ def render(
     frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
     camera : path of a Camera, or the name of the first such
     render_settings : path of a RenderSettings prim
+    render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
     product : path of a RenderProduct; needed where the stage has several
     width, height : pixels, >= 1; one alone keeps the aspect
     samples : samples per pixel, >= 1
+    depth_of_field : spread samples over the camera's lens; as the stage says if None
     integrator : a name of :func:`integrators`
     aovs : names of AOVs or aliases of them (``abbe aovs`` lists them); the stage's RenderVars if None
     wavelength : reference wavelength, nm
@@ -470,6 +478,7 @@ def render(
         frame=frame,
         camera=camera,
         render_settings=render_settings,
+        render_pass=render_pass,
         product=product,
         purposes=purposes,
         variants=variants,
@@ -488,6 +497,7 @@ def render(
         width=width,
         height=height,
         samples=samples,
+        depth_of_field=depth_of_field,
         integrator=integrator,
         aovs=aovs,
         wavelength=wavelength,

@@ -24,6 +24,7 @@ def describe(
     frame: float | Literal["default"] | None = None,
     camera: str | None = None,
     render_settings: str | None = None,
+    render_pass: str | None = None,
     product: str | None = None,
     purposes: Sequence[str] | None = None,
     variants: Sequence[str] = (),
@@ -44,6 +45,7 @@ def describe(
     frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
     camera : path of a Camera, or the name of the first; it then replaces the cameras that products name
     render_settings : path of a RenderSettings prim; the stage's own, or its only one, if None
+    render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
     product : path or name of the one RenderProduct to keep
     purposes : of default, render, proxy, guide (default always counts); the settings', else default and render, if None
     variants : selections such as ``"/World/Ball{material=glass}"``
@@ -79,6 +81,7 @@ def describe(
         frame=frame,
         camera=camera,
         render_settings=render_settings,
+        render_pass=render_pass,
         product=product,
         purposes=purposes,
         variants=variants,
