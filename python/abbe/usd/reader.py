@@ -31,6 +31,7 @@ from .places import Places
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import OpenedStage, Opening, open_stage, source_name
+from .subdivision import refinement_level
 from .values import IDENTITY, is_finite, place, read
 
 __all__ = ["default_camera", "read_stage"]
@@ -138,6 +139,7 @@ class _Walk:
         time: Any,
         purposes: frozenset[str],
         render_pass: RenderPass | None,
+        level: int | None,
         diagnostics: Diagnostics,
     ) -> None:
         self.stage = opened.stage
@@ -146,7 +148,7 @@ class _Walk:
         self.purposes = purposes
         self.diagnostics = diagnostics
         self.places = Places(time)
-        self.shapes = ShapeReader(time, diagnostics)
+        self.shapes = ShapeReader(time, diagnostics, level)
         self._table = ArrayTable()
         self.instancers = InstancerReader(time, diagnostics, self._table)
         self.groups: list[_Group] = [_Group("/")]
@@ -497,6 +499,7 @@ def read_stage(
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
+    complexity: str | None,
     strict: bool,
     **opening: Unpack[Opening],
 ) -> Description:
@@ -505,6 +508,7 @@ def read_stage(
         raise UsageError(f"missing '{missing}': choose 'warn' or 'error'")
     if render_pass and render_settings:
         raise UsageError("render pass: it says which render settings it renders: give one of the two")
+    refinement_level(complexity)  # before the stage is opened
     diagnostics = Diagnostics()
     source = source_name(stage_or_path)
     with quiet_usd(source, diagnostics):
@@ -512,7 +516,17 @@ def read_stage(
         also = [path for path in (camera, render_settings, render_pass, product) if path and path.startswith("/")]
         opened = open_stage(stage_or_path, also=also, diagnostics=diagnostics, **opening)
         return _read(
-            opened, diagnostics, frame, camera, render_settings, render_pass, product, purposes, missing, strict
+            opened,
+            diagnostics,
+            frame,
+            camera,
+            render_settings,
+            render_pass,
+            product,
+            purposes,
+            missing,
+            complexity,
+            strict,
         )
 
 
@@ -526,6 +540,7 @@ def _read(
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
+    complexity: str | None,
     strict: bool,
 ) -> Description:
     stage, source = opened.stage, opened.source
@@ -535,7 +550,8 @@ def _read(
     if active_pass is not None:
         render_settings = active_pass.settings
     settings_prim = find_settings(stage, render_settings, source, diagnostics)
-    walk = _Walk(opened, time, _purposes(purposes, settings_prim), active_pass, diagnostics)
+    shown = _purposes(purposes, settings_prim)
+    walk = _Walk(opened, time, shown, active_pass, refinement_level(complexity), diagnostics)
     walk.run()
     assets = AssetReader(stage, time)
     materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim))
