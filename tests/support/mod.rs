@@ -68,6 +68,7 @@ impl Stagehand {
                 terminal: "outputs:surface".into(),
                 inputs: map(inputs),
                 connected: BTreeMap::new(),
+                networks: BTreeMap::new(),
                 abbe: BTreeMap::new(),
             }),
             alternatives: Vec::new(),

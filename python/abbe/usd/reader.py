@@ -27,6 +27,7 @@ from .lenses import is_lens
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
 from .places import Places
+from .primvars import PrimvarReader
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import OpenedStage, Opening, open_stage, source_name
@@ -354,6 +355,7 @@ class _Walk:
             prims.append(placed.prim)
             prims.extend(placed.prim.GetChild(name) for name in self.shapes.subset_names[placed.shape])
         bound = iter(materials.bound(prims))
+        primvars = PrimvarReader(self.shapes, self.time, self.diagnostics)
         for placed in placements:
             material = next(bound)
             if material is not None:
@@ -361,6 +363,11 @@ class _Walk:
             names = self.shapes.subset_names[placed.shape]
             if names:
                 placed.item["subset_materials"] = [next(bound) for _ in names]
+            used = {material, *placed.item.get("subset_materials", ())}
+            looked_up = {name for index in used if index is not None for name in materials.primvars[index]}
+            if None in used:
+                looked_up.add(tokens.DISPLAY_COLOR)
+            primvars.add(placed.prim, placed.shape, looked_up, placed.item)
         groups: list[dict[str, Any]] = []
         for group in self.groups:
             groups.append({"path": group.path, "items": [placed.item for placed in group.placed]})
@@ -462,7 +469,7 @@ def _read(
     walk = _Walk(opened, time, _purposes(purposes, settings_prim), diagnostics)
     walk.run()
     assets = AssetReader(stage, time)
-    materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim))
+    materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim), assets)
     groups = walk.bind(materials)
 
     cameras: list[dict[str, Any]] = []

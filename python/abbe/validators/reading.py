@@ -138,7 +138,8 @@ class Reading:
         described = self.described
         documents = {} if isinstance(described, StageError) else {m["path"]: m for m in described.document["materials"]}
         seen = {shared_source(self.stage.GetPrimAtPath(path)) for path in documents}
-        reader = MaterialReader(self.time, Diagnostics(), tokens.FULL_PURPOSE)
+        assets = AssetReader(self.stage, self.time)
+        reader = MaterialReader(self.time, Diagnostics(), tokens.FULL_PURPOSE, assets)
         for prim in self.prims:
             if prim.IsA(UsdShade.Material) and shared_source(prim) not in seen:
                 seen.add(shared_source(prim))
