@@ -211,6 +211,7 @@ mod tests {
             focus_distance: 0.0,
             shutter_open: 0.0,
             shutter_close: 0.0,
+            motion: None,
         };
         Camera::new(&description, [60, 40], 1.0, ConformPolicy::ExpandAperture).unwrap()
     }

@@ -82,6 +82,7 @@ fn placement(path: &str, target: Target) -> Placement {
         path: path.into(),
         target,
         transform: None,
+        motion: None,
         instance: None,
         material: None,
         subset_materials: vec![],

@@ -194,7 +194,8 @@ impl Aggregate {
             .reduce(f64::max)?
             * UNSEEN_CONDITION;
         let mut extent: Option<Extent> = None;
-        for mut transform in hull.chain([at(0.0)]) {
+        // What is not finite is nowhere, and neither is what is between it and others.
+        for mut transform in hull.chain([at(0.0)]).filter(DAffine3::is_finite) {
             // What is between two places is rounded where it is in the world.
             let rounding = 8.0 * UNIT_ROUNDOFF * transform.translation.abs();
             transform.translation -= self.origin;
@@ -207,7 +208,7 @@ impl Aggregate {
                 farthest: all.farthest.max(farthest),
             }));
         }
-        extent
+        extent.filter(|extent| extent.bounds.reach().is_finite())
     }
 
     /// Bounds of an instance in render space at all times; `None` where it has no extent.

@@ -18,7 +18,8 @@ use super::{Counts, Scene};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::geometry::{
-    Buffer, InstanceArray, Interpolation, Mesh, MeshReport, NamedPrimvar, Part, PolygonMesh, PrimvarView, Shape, Sphere,
+    Buffer, Deformation, InstanceArray, Interpolation, Mesh, MeshReport, NamedPrimvar, Part, PolygonMesh, PrimvarView,
+    Shape, Sphere, are_increasing,
 };
 
 /// Checks and compiles `description`.
@@ -55,7 +56,7 @@ pub fn build(description: Description) -> Result<Scene> {
             Some(path) => instances.id(path, 1).ok_or_else(|| too_many(path))?,
         };
         let primvars = constants(single.placement, &primvars)?;
-        let world_from_object = single.transform.into();
+        let world_from_object = single.transform.clone();
         objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars });
     }
     let prototypes = prototypes
@@ -65,7 +66,7 @@ pub fn build(description: Description) -> Result<Scene> {
             for part in placed {
                 let Some((shape, part_ids)) = compiler.part(part, &mut diagnostics)? else { continue };
                 let part_ids = PartIds { primvars: constants(part.placement, &primvars)?, ..part_ids };
-                parts.push(Part { shape, place_from_object: part.transform.into() });
+                parts.push(Part { shape, place_from_object: part.transform.clone() });
                 ids.push(part_ids);
             }
             Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids)))
@@ -76,8 +77,8 @@ pub fn build(description: Description) -> Result<Scene> {
         let instances = InstanceArray {
             parts: Arc::clone(parts),
             places: array.places,
-            motion: None,
-            world_from_array: array.transform.into(),
+            motion: array.motion,
+            world_from_array: array.transform,
         };
         let parts = Arc::clone(ids);
         let placed = ObjectArray { instances, parts, first_id: array.first_id, indices: array.indices };
@@ -305,7 +306,15 @@ fn compile_shape(description: &Description, shape: &description::Shape, names: &
                 primvars: names.iter().map(|name| arrays.named_primvar(mesh, name)).collect::<Result<_>>()?,
                 subsets: &subsets,
             };
-            let mesh = Mesh::from_polygons(&polygons);
+            let normals = polygons.normals.as_ref().map(|normals| normals.values.len());
+            let deformation = match &mesh.motion {
+                Some(motion) => match arrays.deformation(motion, polygons.points.len(), normals)? {
+                    Ok(deformation) => Some(deformation),
+                    Err(problem) => return Ok(Err(problem)),
+                },
+                None => None,
+            };
+            let mesh = Mesh::deforming(&polygons, deformation);
             Ok(mesh.map(|(mesh, report)| Built::Shape(Arc::new(Shape::Mesh(mesh)), Some(report))))
         }
         other => Ok(solids::compile(other).map(|compiled| solid(compiled.map(Shape::Solid)))),
@@ -364,6 +373,37 @@ impl<'a> NamedArrays<'a> {
         let array = self.get(name, element, columns)?;
         Buffer::new(array.bytes.clone())
             .map_err(|problem| Error::scene(self.place, format!("array '{name}': {problem}")))
+    }
+
+    /// Points and normals at other times: of a mesh with so many points, and floats in its normals. What is only broken (not
+    /// what is missing from the file) is the inner error.
+    fn deformation(
+        &self,
+        motion: &description::MeshMotion,
+        points: usize,
+        normals: Option<usize>,
+    ) -> Result<Result<Deformation>> {
+        let description::MeshMotion { times, points: names, normals: normal_names } = motion;
+        let broken = |problem: &str| Ok(Err(Error::scene(self.place, problem)));
+        if !are_increasing(times) || times.len() > unroll::MAX_TIMES {
+            return broken("the times of its motion do not increase");
+        }
+        if names.len() != times.len() || ![0, times.len()].contains(&normal_names.len()) {
+            return broken("its motion needs points, and normals if any, for each of its times");
+        }
+        let moved: Vec<Buffer<[f32; 3]>> = names.iter().map(|name| self.buffer(name, 3)).collect::<Result<_>>()?;
+        if moved.iter().any(|moved| moved.len() != points) {
+            return broken("its motion has another number of points at another time");
+        }
+        if moved.par_iter().any(|moved| moved.iter().flatten().any(|v| !v.is_finite())) {
+            return broken("its motion has a point that is not finite");
+        }
+        let turned: Vec<Buffer<f32>> = normal_names.iter().map(|name| self.buffer(name, 3)).collect::<Result<_>>()?;
+        if turned.iter().any(|turned| Some(turned.len()) != normals) {
+            return broken("its motion has another number of normals at another time");
+        }
+        let normals = (!turned.is_empty()).then_some(turned);
+        Ok(Ok(Deformation { times: times.clone(), points: moved, normals }))
     }
 
     fn integers(&self, name: &str) -> Result<&'a [i32]> {

@@ -130,6 +130,9 @@ pub struct Stage {
     /// Frames per second of the stage.
     #[serde(default)]
     pub frames_per_second: Option<f64>,
+    /// The interval about the frame in which motion was looked for; absent if it was not.
+    #[serde(default)]
+    pub motion: Option<[f64; 2]>,
 }
 
 /// A shape in its object space.
@@ -288,6 +291,42 @@ pub struct Mesh {
     /// Faces with materials of their own. Faces in none have the placement's material.
     #[serde(default)]
     pub subsets: Vec<Subset>,
+    /// Where the points are at other times than the frame; they do not move if absent.
+    #[serde(default)]
+    pub motion: Option<MeshMotion>,
+}
+
+/// Transforms at other times than the frame, whose own stands beside them: linear between the samples, held beyond.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Motion {
+    /// In frames (time codes of the stage) from the frame, increasing.
+    pub times: Vec<f64>,
+    /// One for each time.
+    pub transforms: Vec<[f64; 16]>,
+}
+
+/// Points of a mesh at other times than the frame: linear between the samples, held beyond.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshMotion {
+    /// In frames from the frame, increasing.
+    pub times: Vec<f64>,
+    /// One array for each time, as [`Mesh::points`].
+    pub points: Vec<String>,
+    /// One array for each time, as the values of [`Mesh::normals`]; none if the normals do not move.
+    #[serde(default)]
+    pub normals: Vec<String>,
+}
+
+/// Transforms of instances at other times than the frame: linear between the samples, held beyond.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstancesMotion {
+    /// In frames from the frame, increasing.
+    pub times: Vec<f64>,
+    /// One array for each time, as [`Instances::transforms`].
+    pub transforms: Vec<String>,
 }
 
 /// Values over a mesh.
@@ -345,6 +384,12 @@ pub struct Instances {
     pub indices: Option<String>,
     /// Elements of the instancer, hidden ones and those of other prototypes included.
     pub count: usize,
+    /// The surrounding group's space from the instancer's at other times.
+    #[serde(default)]
+    pub motion: Option<Motion>,
+    /// The instancer's space from the prototype's at other times.
+    #[serde(default)]
+    pub places_motion: Option<InstancesMotion>,
 }
 
 /// A shape or a group, placed.
@@ -358,6 +403,9 @@ pub struct Placement {
     /// Parent space from object space; identity if absent.
     #[serde(default)]
     pub transform: Option<[f64; 16]>,
+    /// Parent space from object space at other times than the frame; it does not move if absent.
+    #[serde(default)]
+    pub motion: Option<Motion>,
     /// Path of the instance this belongs to; the `instance_id`.
     #[serde(default)]
     pub instance: Option<String>,
@@ -501,6 +549,9 @@ pub struct Camera {
     /// Shutter closing.
     #[serde(default)]
     pub shutter_close: f64,
+    /// The transform at other times than the frame.
+    #[serde(default)]
+    pub motion: Option<Motion>,
 }
 
 /// Render settings with their products flattened by the rules of UsdRenderComputeSpec.

@@ -41,6 +41,7 @@ impl Stagehand {
                 up_axis: "Y".into(),
                 time_code: None,
                 frames_per_second: Some(24.0),
+                motion: None,
             },
             shapes: vec![],
             groups: vec![Group { path: "/".into(), items: vec![], instances: vec![] }],
@@ -162,6 +163,7 @@ impl Stagehand {
             uv_name: None,
             primvars: BTreeMap::new(),
             subsets: vec![],
+            motion: None,
         }));
         self.place(path, transform, material);
     }
@@ -182,6 +184,7 @@ impl Stagehand {
             path: path.into(),
             target: Target::Shape(shape),
             transform: Some(transform.to_cols_array()),
+            motion: None,
             instance: None,
             material,
             subset_materials: vec![],
@@ -233,6 +236,7 @@ impl Stagehand {
             focus_distance: 0.0,
             shutter_open: 0.0,
             shutter_close: 0.0,
+            motion: None,
         });
     }
 

@@ -143,6 +143,7 @@ class _Walk:
         self.cameras: list[Any] = []
         self._kinds: dict[str, _Kind] = {}
         self._facts_by_prim: dict[Any, _Facts] = {}
+        self._hidden: dict[tuple[Any, str], bool] = {}
         self._group_by_prototype: dict[tuple[Any, str | None], int] = {}
         # The prototypes around what is visited, innermost last.
         self._open: list[Any] = []
@@ -301,6 +302,9 @@ class _Walk:
         if purpose not in self.purposes:
             self.diagnostics.skip(f"purpose {purpose}")
             return
+        if purpose != tokens.DEFAULT and self._hides(prim, purpose):
+            self.diagnostics.skip("invisible")
+            return
         if kind is _Kind.MESH:
             self._place(prim, path, self.shapes.mesh(prim, source), state, group)
         elif kind is _Kind.SPHERE:
@@ -323,6 +327,27 @@ class _Walk:
             self.diagnostics.warn(
                 "unsupported-prim", place(prim), f"{prim.GetTypeName()} prims are not supported; they are left out"
             )
+
+    def _hides(self, prim: Any, purpose: str) -> bool:
+        """Whether the nearest authored visibility of a purpose, the prim's own or one above it, is invisible.
+
+        The fallback of guides is invisible too, but here they are shown only where somebody has asked for guides.
+        """
+        asked, is_hidden = [], False
+        while prim:
+            known = self._hidden.get((prim, purpose))
+            if known is not None:
+                is_hidden = known
+                break
+            asked.append((prim, purpose))
+            if prim.HasAPI(UsdGeom.VisibilityAPI):
+                attribute = prim.GetAttribute(purpose + tokens.PURPOSE_VISIBILITY)
+                if attribute and attribute.HasAuthoredValue():
+                    is_hidden = read(prim, attribute.GetName(), self.time) == tokens.INVISIBLE
+                    break
+            prim = prim.GetParent()
+        self._hidden.update((key, is_hidden) for key in asked)
+        return is_hidden
 
     def _check_draw_mode(self, prim: Any, state: _State) -> None:
         mode = read(prim, tokens.DRAW_MODE, self.time)

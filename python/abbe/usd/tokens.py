@@ -21,6 +21,8 @@ TIME_CODES_PER_SECOND: Final = "timeCodesPerSecond"
 VISIBILITY: Final = "visibility"
 INVISIBLE: Final = "invisible"
 PURPOSE: Final = "purpose"
+# Of VisibilityAPI, behind the name of a purpose.
+PURPOSE_VISIBILITY: Final = "Visibility"
 DEFAULT: Final = "default"
 PURPOSES: Final = ("default", "render", "proxy", "guide")
 DEFAULT_PURPOSES: Final = ("default", "render")
