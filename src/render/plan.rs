@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::request::Request;
 use super::settings::{self, Attributes};
+use super::textures;
 use super::validity;
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
@@ -103,6 +104,8 @@ pub struct Plan {
     pub seed: u64,
     /// Threads, 0 for all.
     pub threads: usize,
+    /// Memory for the texels of images, bytes.
+    pub texture_memory: u64,
     /// Name of the integrator.
     pub integrator: String,
     /// Layers in the film's order.
@@ -188,6 +191,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     };
     let compression = product.map(|p| settings::compression(p, &mut diagnostics)).unwrap_or_default();
     attributes.warn_of_unused(&mut diagnostics);
+    textures::report_missing(scene, &needs, &mut diagnostics);
     if request.strict {
         refuse_warnings(&[scene.diagnostics(), &diagnostics])?;
     }
@@ -204,6 +208,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         samples,
         seed,
         threads: settings::threads(request)?,
+        texture_memory: textures::memory(request)?,
         integrator: integrator.name().to_owned(),
         layers,
         optics,
@@ -323,11 +328,8 @@ fn reasons(
             None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
         }
     }
-    note(
-        false,
-        "light sampling, emission, textures",
-        format!("the integrator '{}' has no use for them", integrator.name()),
-    );
+    textures::decide(scene, layers, needs, &mut note);
+    note(false, "light sampling, emission", format!("the integrator '{}' has no use for them", integrator.name()));
     for (reason, count) in &scene.skipped {
         note(false, reason, format!("{count} left out by the bridge"));
     }

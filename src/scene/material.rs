@@ -21,13 +21,13 @@ use crate::optics::dispersion::{Dispersion, OutOfRange};
 use crate::optics::media::Priority;
 use crate::optics::{Absorption, Extinction, catalog};
 use crate::scene::description::{self, Shader};
+use crate::texture::{Builder, Program};
 
-pub(in crate::scene) use appearance::UNSTATED;
 pub use appearance::{Appearance, Below, Opacity};
 use dialect::{Glass, Response, Surface};
 use law::{Authored, StatedAbsorption};
 use network::Networks;
-pub(in crate::scene) use resources::{Resources, source};
+pub(in crate::scene) use resources::Resources;
 use values::Values;
 
 /// From this weight on a surface counts as what the weight says: transmissive, metallic, present.
@@ -137,6 +137,17 @@ impl Kind {
     }
 }
 
+/// The albedo of what has no material, as Hydra shows it: `displayColor`, or a grey.
+pub(super) fn display_color(resources: &mut Resources<'_>) -> Program {
+    let mut builder = Builder::default();
+    let mut compile = || {
+        let grey = builder.constant(appearance::UNSTATED)?;
+        let color = builder.primvar(resources.primvar("displayColor"), grey)?;
+        builder.program(color)
+    };
+    compile().expect("two operations are not too many")
+}
+
 /// Compiles what was authored. Errors name the prim and attribute, and what to author instead.
 pub(super) fn compile(
     material: &description::Material,
@@ -163,6 +174,23 @@ pub(super) fn compile(
     Ok(Material { path: material.path.clone(), kind, chosen, appearance })
 }
 
+/// A material by itself: nothing of it is an image.
+#[cfg(test)]
+fn compile_alone(
+    material: &description::Material,
+    context: &Context,
+    diagnostics: &mut Diagnostics,
+) -> Result<Material> {
+    let document = serde_json::json!({
+        "format": description::FORMAT, "version": description::VERSION,
+        "stage": {"source": "", "meters_per_unit": 1.0, "up_axis": "Y"},
+        "shapes": [], "groups": [], "root": 0, "materials": [], "cameras": [],
+    });
+    let document = serde_json::from_value(document).expect("is a document");
+    let description = description::Description { document, arrays: Default::default() };
+    compile(material, context, &mut Resources::new(&description), diagnostics)
+}
+
 fn classify(
     material: &description::Material,
     terminals: &[&Shader],
@@ -170,7 +198,6 @@ fn classify(
     context: &Context,
     diagnostics: &mut Diagnostics,
 ) -> Result<(Kind, String)> {
-
     let mut places = vec![Values::new(&material.abbe, &material.path, "")];
     if let Some(shader) = surface.map(Surface::shader).or(material.surface.as_ref()) {
         places.push(Values::new(&shader.abbe, &shader.path, "inputs:"));

@@ -5,7 +5,7 @@
 //! constants is computed when the program is built. Arithmetic is in f32 with the functions of `libm`, so that programs
 //! give the same bits everywhere.
 
-use super::sample::Lookup;
+use super::sample::{Images, Lookup};
 use super::store::Store;
 
 /// The longest program.
@@ -391,9 +391,12 @@ impl Program {
         }
     }
 
-    /// The images that it looks up.
-    pub fn lookups(&self) -> &[Lookup] {
-        &self.lookups
+    /// The numbers of the images that it looks up.
+    pub fn images(&self) -> impl Iterator<Item = u32> {
+        self.lookups.iter().flat_map(|lookup| match &lookup.images {
+            Images::Single(number) => vec![*number],
+            Images::Tiles(tiles) => tiles.iter().map(|tile| tile.1).collect(),
+        })
     }
 
     /// The value where `primvar` gives the primvars by their numbers.

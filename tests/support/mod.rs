@@ -73,6 +73,7 @@ impl Stagehand {
                 abbe: BTreeMap::new(),
             }),
             alternatives: Vec::new(),
+            nodes: Vec::new(),
         });
         self.document.materials.len() - 1
     }

@@ -6,7 +6,7 @@ a layer holds it; declared inputs without a value mean the shader's own default 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import PurePosixPath
 from typing import Any
@@ -36,11 +36,12 @@ def warn_unknown_names(
 class MaterialReader:
     """Reads bound materials, each prototype's once."""
 
-    def __init__(self, time: Any, diagnostics: Diagnostics, purpose: str, assets: AssetReader) -> None:
+    def __init__(self, time: Any, diagnostics: Diagnostics, purposes: Sequence[str], assets: AssetReader) -> None:
+        """Read materials at ``time``; the first of ``purposes`` counts for which a prim has a binding."""
         self._time = time
         self._assets = assets
         self._diagnostics = diagnostics
-        self._purpose = purpose
+        self._purposes = tuple(purposes)
         self._index_by_prim: dict[Any, int] = {}
         self._users: list[list[Any]] = []
         self.materials: list[dict[str, Any]] = []
@@ -48,16 +49,15 @@ class MaterialReader:
         """Per material: the names of the primvars that it may look up."""
 
     def bound(self, prims: list[Any]) -> list[int | None]:
-        """Return for each prim the index of its material: the binding's purpose first, then the all-purpose one.
+        """Return for each prim the index of its material, by the purposes in their order.
 
         All prims of a stage come at once: what a material says may depend on all of its geometry.
         """
         if not prims:
             return []
-        materials, relationships = UsdShade.MaterialBindingAPI.ComputeBoundMaterials(prims, self._purpose)
         result: list[int | None] = []
         found: list[Any] = []
-        for prim, material, relationship in zip(prims, materials, relationships, strict=True):
+        for prim, (material, relationship) in zip(prims, self._bindings(prims), strict=True):
             if material:
                 result.append(self._index(material.GetPrim(), prim, found))
                 continue
@@ -74,6 +74,24 @@ class MaterialReader:
             self.materials.append(material)
             self.primvars.append(frozenset(primvars))
         return result
+
+    def _bindings(self, prims: list[Any]) -> list[tuple[Any, Any]]:
+        """Return for each prim its material, None if there is none, and the relationship that counts."""
+        bindings: list[tuple[Any, Any]] = [(None, None)] * len(prims)
+        open_places = list(range(len(prims)))
+        for purpose in self._purposes:
+            if not open_places:
+                break
+            # USD falls back on the all-purpose binding, whose turn may come later or never.
+            of_purpose = UsdShade.MaterialBindingAPI.ComputeBoundMaterials([prims[i] for i in open_places], purpose)
+            undecided = []
+            for i, material, relationship in zip(open_places, *of_purpose, strict=True):
+                if relationship and _binding_purpose(relationship) == purpose:
+                    bindings[i] = (material, relationship)
+                else:
+                    undecided.append(i)
+            open_places = undecided
+        return bindings
 
     def unbound(self, prim: Any) -> dict[str, Any]:
         """Return a Material prim as the description has it, without regard to what is bound to it."""
@@ -164,6 +182,14 @@ class MaterialReader:
             if data is not None:
                 constants[name] = {"type": value.type, "value": data}
         return constants, connected
+
+
+def _binding_purpose(relationship: Any) -> str:
+    """Return the purpose of a binding: ``material:binding[:full]``, ``material:binding:collection[:full]:name``."""
+    parts = relationship.GetName().split(":")[2:]
+    if parts[:1] == [tokens.COLLECTION]:
+        return parts[1] if len(parts) > 2 else ""
+    return parts[0] if parts else ""
 
 
 def _has_primvar(prims: Iterable[Any], name: str) -> bool:

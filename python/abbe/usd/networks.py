@@ -1,7 +1,7 @@
-"""Shading networks that are no constants: the nodes behind an input, as they were authored, and the primvars they read.
+"""Shading networks that are no constants: the nodes behind an input as they were authored, and the primvars they read.
 
-What the nodes compute is for the core to say. Here they become a list in which every node stands behind those that it is
-connected to, each once, with the constants among its inputs, and its files found.
+What the nodes compute is for the core to say. Here they become a list in which every node stands behind those that it
+is connected to, each once, with the constants among its inputs, and its files found.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class NodeReader:
                 self._refuse(shader, "its connections lead back to it; they are ignored")
             return index
         if self._depth == _DEEPEST or len(self.nodes) >= _MOST:
-            self._refuse(shader, f"the network is deeper than {_DEEPEST} nodes or has more than {_MOST}; it is cut here")
+            self._refuse(shader, f"the network has more than {_MOST} nodes, or {_DEEPEST} in a row; it is cut here")
             return None
         self._index[path] = None
         self._depth += 1

@@ -494,7 +494,7 @@ def _read(
     walk = _Walk(opened, time, _purposes(purposes, settings_prim), diagnostics)
     walk.run()
     assets = AssetReader(stage, time)
-    materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim), assets)
+    materials = MaterialReader(time, diagnostics, _binding_purposes(settings_prim), assets)
     groups = walk.bind(materials)
 
     cameras: list[dict[str, Any]] = []
@@ -566,12 +566,10 @@ def _purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[str]:
     return frozenset([tokens.DEFAULT, *wanted])
 
 
-def _binding_purpose(settings: Any) -> str:
-    """Return the material purpose: the first of the settings' that is not the all-purpose one."""
+def _binding_purposes(settings: Any) -> Sequence[str]:
+    """Return the material purposes in the order in which they count: the settings', else full and all-purpose."""
     authored = None if settings is None else token_list(settings, tokens.MATERIAL_BINDING_PURPOSES)
-    if authored is None:
-        return tokens.FULL_PURPOSE
-    return next(filter(None, authored), str(UsdShade.Tokens.allPurpose))
+    return tokens.BINDING_PURPOSES if authored is None else authored
 
 
 def default_camera(stage: Any, settings: Any, cameras: list[Any]) -> Any:

@@ -84,7 +84,9 @@ INDICES: Final = "indices"
 
 # Materials.
 MATERIAL_BINDING: Final = "material:binding"
-FULL_PURPOSE: Final = "full"
+COLLECTION: Final = "collection"
+# The all-purpose binding has no name.
+BINDING_PURPOSES: Final = ("full", "")
 OUTPUTS_PREFIX: Final = "outputs:"
 INPUTS: Final = "inputs"
 INPUTS_PREFIX: Final = "inputs:"

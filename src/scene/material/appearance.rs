@@ -198,13 +198,10 @@ impl Appearance {
         })
     }
 
-    /// The images that are looked up for the albedo, and for where the surface is there.
-    pub fn programs(&self) -> impl Iterator<Item = &Program> {
-        [&self.albedo, &self.base_color, &self.metallic, &self.roughness]
-            .into_iter()
-            .chain(&self.emission)
-            .chain(&self.normal)
-            .chain(self.opacity.as_ref().map(|opacity| &opacity.program))
+    /// The programs that a render runs: for where the surface is there, and for its albedo if that `is_asked`.
+    pub fn looked_up(&self, is_asked: bool) -> impl Iterator<Item = &Program> {
+        let opacity = self.opacity.as_ref().map(|opacity| &opacity.program);
+        opacity.into_iter().chain(is_asked.then_some(&self.albedo))
     }
 }
 
@@ -215,7 +212,7 @@ struct Painter<'a, 'n, 'd> {
     diagnostics: &'d mut Diagnostics,
 }
 
-impl Painter<'_, '_, '_> {
+impl<'a> Painter<'a, '_, '_> {
     fn paint(&mut self, model: &Model, is_glass: bool, opacity: Option<OpacityInput>) -> Result<Appearance, TooLarge> {
         let color = self.color(model.base_color.0, model.base_color.1)?;
         let weight = self.number(model.base_weight)?;
@@ -324,7 +321,7 @@ impl Painter<'_, '_, '_> {
     }
 
     /// An authored constant; what is no value of its type is warned of, and is none.
-    fn authored<T>(&mut self, name: &str, read: impl Fn(&Values<'_>, &str) -> crate::Result<Option<T>>) -> Option<T> {
+    fn authored<T>(&mut self, name: &str, read: impl Fn(&Values<'a>, &str) -> crate::Result<Option<T>>) -> Option<T> {
         if name.is_empty() || self.shader.connected.contains_key(name) {
             return None;
         }
@@ -334,6 +331,7 @@ impl Painter<'_, '_, '_> {
         })
     }
 
+    /// What drives the input `name`; `None` where nothing does, or, with a warning, what is not understood.
     fn driven(&mut self, name: &str) -> Option<Register> {
         if name.is_empty() || !self.shader.connected.contains_key(name) {
             return None;

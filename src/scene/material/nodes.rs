@@ -164,7 +164,7 @@ fn image(
                 Some(name) => primvar(name, 2, None, b, resources)?,
                 None => default_uv(0, b, resources)?,
             };
-            let space = auto(file.color_space);
+            let space = stated(file.color_space, inputs)?;
             let lookup = Lookup {
                 images: file.images,
                 space,
@@ -185,7 +185,7 @@ fn image(
                 None => default_uv(0, b, resources)?,
             };
             let is_linear = inputs.integer("linearize", 0) == 0 && file.color_space.is_empty();
-            let space = if is_linear { Some(ColorSpace::RAW) } else { auto(file.color_space) };
+            let space = if is_linear { Some(ColorSpace::RAW) } else { stated(file.color_space, inputs)? };
             let fallback = inputs.or("missingColor", [1.0, 0.0, 1.0, 1.0], b)?;
             let wrap = [Wrap::Repeat; 2];
             let lookup = Lookup { images: file.images, space, wrap, border: [0.0; 4], closest: false };
@@ -195,9 +195,9 @@ fn image(
     }
 }
 
-/// The colour space with a name; what the file says where there is no name, or none that is known.
-fn auto(name: &str) -> Option<ColorSpace> {
-    if name.is_empty() || name.eq_ignore_ascii_case("auto") { None } else { ColorSpace::named(name) }
+/// The colour space with a name; `None`, for what the file says, where there is no name.
+fn stated(name: &str, inputs: &Inputs<'_>) -> Compiled<Option<ColorSpace>> {
+    if name.is_empty() || name.eq_ignore_ascii_case("auto") { Ok(None) } else { named(name, inputs).map(Some) }
 }
 
 fn named(name: &str, inputs: &Inputs<'_>) -> Compiled<ColorSpace> {
@@ -251,8 +251,7 @@ fn uv_texture(
     let default = if id == "UsdUVTexture" { Wrap::Border } else { Wrap::Repeat };
     let wrap = [inputs.wrap("wrapS", default)?, inputs.wrap("wrapT", default)?];
     let space = match inputs.text("sourceColorSpace") {
-        None | Some("auto") if file.color_space.is_empty() => None,
-        None | Some("auto") => Some(named(file.color_space, inputs)?),
+        None | Some("auto") => stated(file.color_space, inputs)?,
         Some(name) => Some(named(name, inputs)?),
     };
     let uv = match inputs.given("st", b)? {

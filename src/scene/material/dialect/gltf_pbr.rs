@@ -86,7 +86,8 @@ impl Dialect for GltfPbr {
 
     fn opacity(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Option<OpacityInput>> {
         let limit = if inputs.is_looked_up(ALPHA.name) { limit(inputs, diagnostics)? } else { None };
-        let cut_out = |limit| OpacityInput { name: ALPHA.name, limit: limit as f32, below: Below::CutOut, is_color: false };
+        let cut_out =
+            |limit| OpacityInput { name: ALPHA.name, limit: limit as f32, below: Below::CutOut, is_color: false };
         Ok(limit.map(cut_out))
     }
 
