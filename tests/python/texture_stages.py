@@ -11,7 +11,16 @@ STAGE = """#usda 1.0
     defaultPrim = "World"
     metersPerUnit = 1
     upAxis = "Y"
+    renderSettingsPrimPath = "/Render/Settings"
 )
+def Scope "Render"
+{
+    def RenderSettings "Settings"
+    {
+        # Whatever the resolution, the square fills it.
+        uniform token aspectRatioConformPolicy = "adjustPixelAspectRatio"
+    }
+}
 def Xform "World"
 {
     def Camera "Camera"
