@@ -52,6 +52,7 @@ class Options(TypedDict, total=False):
     width: int | None
     height: int | None
     samples: int | None
+    depth_of_field: bool | None
     integrator: str | None
     aovs: Sequence[str] | None
     wavelength: float | None
@@ -137,6 +138,7 @@ class Scene:
         frame: float | Literal["default"] | None = None,
         camera: str | None = None,
         render_settings: str | None = None,
+        render_pass: str | None = None,
         product: str | None = None,
         purposes: Sequence[str] | None = None,
         variants: Sequence[str] = (),
@@ -146,6 +148,7 @@ class Scene:
         mask: Sequence[str] = (),
         payloads: str = "all",
         missing: str = "warn",
+        complexity: str | None = None,
         scalar_ior: str | None = None,
         strict: bool = False,
     ) -> Scene:
@@ -157,6 +160,7 @@ class Scene:
         frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
         camera : path of a Camera, or the name of the first such; it then replaces the cameras that products name
         render_settings : path of a RenderSettings prim; the stage's own if None
+        render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
         product : path or name of the one RenderProduct to keep
         purposes : of default, render, proxy, guide; the settings', else default and render, if None
         variants : selections such as ``"/World/Ball{material=glass}"``
@@ -166,6 +170,8 @@ class Scene:
         mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
         payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
         missing : what to do where a layer, prim or texture that is referred to is missing: ``"warn"`` or ``"error"``
+        complexity : ``"low"``, ``"medium"``, ``"high"``, ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
+            ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
         scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
         strict : a stage without a camera is an error
 
@@ -190,6 +196,7 @@ class Scene:
             frame=frame,
             camera=camera,
             render_settings=render_settings,
+            render_pass=render_pass,
             product=product,
             purposes=purposes,
             variants=variants,
@@ -199,6 +206,7 @@ class Scene:
             mask=mask,
             payloads=payloads,
             missing=missing,
+            complexity=complexity,
             scalar_ior=scalar_ior,
             strict=strict,
         )
@@ -397,10 +405,12 @@ def render(
     frame: float | Literal["default"] | None = None,
     camera: str | None = None,
     render_settings: str | None = None,
+    render_pass: str | None = None,
     product: str | None = None,
     width: int | None = None,
     height: int | None = None,
     samples: int | None = None,
+    depth_of_field: bool | None = None,
     integrator: str | None = None,
     aovs: Sequence[str] | None = None,
     wavelength: float | None = None,
@@ -419,6 +429,7 @@ def render(
     mask: Sequence[str] = (),
     payloads: str = "all",
     missing: str = "warn",
+    complexity: str | None = None,
     scalar_ior: str | None = None,
     strict: bool = False,
     progress: Callable[[Progress], object] | None = None,
@@ -434,9 +445,11 @@ def render(
     frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
     camera : path of a Camera, or the name of the first such
     render_settings : path of a RenderSettings prim
+    render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
     product : path of a RenderProduct; needed where the stage has several
     width, height : pixels, >= 1; one alone keeps the aspect
     samples : samples per pixel, >= 1
+    depth_of_field : spread samples over the camera's lens; as the stage says if None
     integrator : a name of :func:`integrators`
     aovs : names of AOVs or aliases of them (``abbe aovs`` lists them); the stage's RenderVars if None
     wavelength : reference wavelength, nm
@@ -447,7 +460,7 @@ def render(
     texture_memory : for the texels of images, MB, 4294 if None; what does not fit goes to a temporary file
     crop : x0, y0, x1, y1 in pixels, half-open, y down
     sample_range : begin and end, half-open: a part that :func:`merge` joins with others
-    purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, scalar_ior : as for
+    purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, complexity, scalar_ior : as for
         :meth:`Scene.from_stage`
     strict : any warning, of the stage or the request, is an error
     progress : called about ten times a second; ``print`` will do
@@ -474,6 +487,7 @@ def render(
         frame=frame,
         camera=camera,
         render_settings=render_settings,
+        render_pass=render_pass,
         product=product,
         purposes=purposes,
         variants=variants,
@@ -483,6 +497,7 @@ def render(
         mask=mask,
         payloads=payloads,
         missing=missing,
+        complexity=complexity,
         scalar_ior=scalar_ior,
         strict=strict,
     )
@@ -492,6 +507,7 @@ def render(
         width=width,
         height=height,
         samples=samples,
+        depth_of_field=depth_of_field,
         integrator=integrator,
         aovs=aovs,
         wavelength=wavelength,

@@ -3,10 +3,13 @@
 //! Tiles are rendered by any thread in any order; what a pixel gets depends on the pixel alone, so the film has the same
 //! bits for any number of threads. Cancelling leaves the finished tiles.
 
+mod driver;
+mod layers;
 pub mod metadata;
 pub mod plan;
 pub mod request;
 mod settings;
+mod shot;
 mod textures;
 pub mod trace;
 mod validity;
@@ -18,11 +21,12 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
+pub use layers::PlannedLayer;
 pub use plan::{Plan, plan};
 pub use request::Request;
 pub use trace::trace;
 
-use crate::camera::Camera;
+use crate::camera::{Camera, Lens};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::Aov;
@@ -125,7 +129,11 @@ pub fn render(scene: &Scene, plan: &Plan, registry: &Registry, control: &Control
 /// The camera of `plan`, fitted to its image.
 pub(crate) fn camera(scene: &Scene, plan: &Plan) -> Result<Camera> {
     let authored = &scene.document().cameras[plan.camera];
-    Camera::new(authored, plan.resolution, plan.pixel_aspect_ratio, plan.conform_policy)
+    let camera = Camera::new(authored, plan.resolution, plan.pixel_aspect_ratio, plan.conform_policy)?;
+    Ok(match Lens::of(authored) {
+        Some(lens) if plan.depth_of_field => camera.with_lens(lens),
+        _ => camera,
+    })
 }
 
 fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Control<'_>) -> Result<Rendered> {
@@ -214,6 +222,22 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
             ),
         );
     }
+    let authored = &scene.document().cameras[plan.camera];
+    if counters.unseen > 0
+        && let Some([near, far]) = authored.clipping_range
+        && !authored.clipping_authored
+        && authored.clipping_planes.is_empty()
+        && !scene.objects.hides_some()
+    {
+        warnings.warn(
+            "clipped-by-fallback",
+            format!("{}.clippingRange", authored.path),
+            format!(
+                "is not authored, and its fallback ({near}, {far}) hides surfaces from {} rays: author the range that is                  wanted",
+                counters.unseen
+            ),
+        );
+    }
     if non_finite_values > 0 {
         warnings.warn(
             "non-finite",
@@ -261,7 +285,11 @@ fn empty_film(plan: &Plan, camera: &Camera) -> Result<Film> {
         window: plan.window,
         pixel_aspect_ratio: camera.pixel_aspect_ratio as f32,
         samples: plan.samples,
-        layers: plan.layers.iter().map(|layer| Layer::new(layer.aov, layer.name.clone(), pixels, keep_sums)).collect(),
+        layers: plan
+            .layers
+            .iter()
+            .map(|layer| Layer { half: layer.half, ..Layer::new(layer.aov, layer.name.clone(), pixels, keep_sums) })
+            .collect(),
     })
 }
 

@@ -6,14 +6,18 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::driver::Driver;
+use super::layers::{PlannedLayer, layers};
 use super::request::Request;
 use super::settings::{self, Attributes};
+use super::shot::{DepthOfField, Shot};
 use super::textures;
 use super::validity;
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::{Aov, INTERNAL_TRANSMITTANCE};
+use crate::film::metadata::Attribute;
 use crate::film::{SampleRange, Window};
 use crate::geometry::Shape;
 use crate::integrator::transmittance::absorbs;
@@ -23,20 +27,6 @@ use crate::scene::Scene;
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
 use crate::spectrum::{Wavelength, lines};
-
-/// One layer to be rendered.
-#[derive(Clone, Debug, Serialize)]
-pub struct PlannedLayer {
-    /// Its AOV.
-    #[serde(serialize_with = "aov_name")]
-    pub aov: &'static Aov,
-    /// EXR layer name.
-    pub name: String,
-}
-
-fn aov_name<S: serde::Serializer>(aov: &&'static Aov, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(aov.name)
-}
 
 /// A decision with its reason.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -98,6 +88,8 @@ pub struct Plan {
     /// How the aperture is fitted.
     #[serde(skip)]
     pub conform_policy: ConformPolicy,
+    /// Whether samples are spread over the lens.
+    pub depth_of_field: bool,
     /// Samples rendered.
     pub samples: SampleRange,
     /// Seed of the sample positions.
@@ -116,6 +108,9 @@ pub struct Plan {
     pub needs: Needs,
     /// EXR compression.
     pub compression: String,
+    /// Attributes that the product wants in the header.
+    #[serde(skip)]
+    pub header: Vec<(String, Attribute)>,
     /// What is carried and computed, and why.
     pub carried: Vec<Decision>,
     /// What is skipped, and why.
@@ -151,31 +146,10 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let mut diagnostics = Diagnostics::default();
     let attributes = Attributes::new(scene, product);
 
-    let (camera, camera_path) = settings::camera(scene, request, product)?;
-    let authored_camera = &scene.document().cameras[camera];
-    let resolution = settings::resolution(request, product, authored_camera)?;
-    let window = settings::window(request, product, resolution)?;
-    let policy = product.map_or("expandAperture", |p| p.aspect_ratio_conform_policy.as_str());
-    let conform_policy = ConformPolicy::from_token(policy).ok_or_else(|| {
-        Error::scene(
-            settings::product_place(product),
-            format!("unknown aspectRatioConformPolicy '{policy}': use expandAperture"),
-        )
-    })?;
-    if authored_camera.f_stop > 0.0
-        && authored_camera.focus_distance > 0.0
-        && !product.is_some_and(|p| p.disable_depth_of_field)
-    {
-        diagnostics.warn(
-            "depth-of-field",
-            &camera_path,
-            "depth of field is not rendered: rays start at the centre of the lens",
-        );
-    }
-
     let samples = settings::samples(request, &attributes)?;
+    let shot = Shot::new(scene, request, product, samples, &mut diagnostics)?;
     let optics = settings::optics(request, &attributes)?;
-    let (integrator, layers) = settings::layers(request, &attributes, product, registry, &mut diagnostics)?;
+    let (integrator, layers) = layers(request, &attributes, product, registry, &mut diagnostics)?;
     let integrator = registry.find(&integrator)?;
     let aovs: Vec<&Aov> = layers.iter().map(|layer| layer.aov).collect();
     let dispersive = dispersive_material(scene, &optics);
@@ -183,13 +157,16 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let mut needs = integrator.needs(&aovs, dispersive.is_some());
     needs.transmittance &= absorbing.is_some();
     validity::check(scene, &optics, &needs, &aovs)?;
-    let (carried, skipped) = reasons(scene, integrator, &layers, &needs, [dispersive, absorbing], &optics);
+    let (mut carried, mut skipped) = reasons(scene, integrator, &layers, &needs, [dispersive, absorbing], &optics);
+    let DepthOfField { is_on, why } = &shot.depth_of_field;
+    (if *is_on { &mut carried } else { &mut skipped })
+        .push(Decision { what: "depth of field".to_owned(), why: why.clone() });
     let seed = match (request.seed, attributes.integer("abbe:seed")?) {
         (Some(seed), _) => seed,
         (None, Some(seed)) => seed as u64,
         (None, None) => 0,
     };
-    let compression = product.map(|p| settings::compression(p, &mut diagnostics)).unwrap_or_default();
+    let driver = product.map(|p| Driver::new(p, &mut diagnostics)).unwrap_or_default();
     attributes.warn_of_unused(&mut diagnostics);
     textures::report_missing(scene, &needs, &mut diagnostics);
     if request.strict {
@@ -199,12 +176,13 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     Ok(Plan {
         product: product.map(|p| p.path.clone()).unwrap_or_default(),
         output: product.map(|p| p.name.clone()).unwrap_or_default(),
-        camera,
-        camera_path,
-        resolution,
-        window,
-        pixel_aspect_ratio: product.map_or(1.0, |p| p.pixel_aspect_ratio),
-        conform_policy,
+        camera: shot.camera,
+        camera_path: shot.camera_path,
+        resolution: shot.resolution,
+        window: shot.window,
+        pixel_aspect_ratio: shot.pixel_aspect_ratio,
+        conform_policy: shot.conform_policy,
+        depth_of_field: shot.depth_of_field.is_on,
         samples,
         seed,
         threads: settings::threads(request)?,
@@ -213,7 +191,8 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         layers,
         optics,
         needs,
-        compression,
+        compression: driver.compression,
+        header: driver.header,
         carried,
         skipped,
         materials,
@@ -330,6 +309,13 @@ fn reasons(
     }
     textures::decide(scene, layers, needs, &mut note);
     note(false, "light sampling, emission", format!("the integrator '{}' has no use for them", integrator.name()));
+    if scene.objects.hides_some() {
+        note(
+            true,
+            "what is hidden from the camera",
+            "its own rays pass through it; refracted and reflected ones meet it".into(),
+        );
+    }
     for (reason, count) in &scene.skipped {
         note(false, reason, format!("{count} left out by the bridge"));
     }

@@ -1,6 +1,6 @@
 //! The images of a render: which are needed, what is said of those that are missing, and the memory for them.
 
-use super::plan::PlannedLayer;
+use super::layers::PlannedLayer;
 use super::request::Request;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};

@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use super::description::{self, Array, Description, Document, Element, Placement};
 use super::manifest::Manifest;
 use super::material::{self, Context, Material, Resources, ScalarIor};
-use super::objects::{ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
+use super::meshes;
+use super::objects::{Appearance, ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
 use super::solids;
 use super::unroll::{self, Placed, Unrolled};
 use super::{Counts, Scene};
@@ -50,7 +51,9 @@ pub fn build(description: Description) -> Result<Scene> {
     };
     let mut objects = Vec::with_capacity(singles.len());
     for single in &singles {
-        let Some((shape, PartIds { prim_id, material_ids, .. })) = compiler.part(single, &mut diagnostics)? else {
+        let Some((shape, PartIds { prim_id, material_ids, appearance, .. })) =
+            compiler.part(single, &mut diagnostics)?
+        else {
             continue;
         };
         let instance_id = match single.instance {
@@ -59,7 +62,7 @@ pub fn build(description: Description) -> Result<Scene> {
         };
         let primvars = constants(single.placement, &primvars)?;
         let world_from_object = single.transform.clone();
-        objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars });
+        objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars, appearance });
     }
     let prototypes = prototypes
         .iter()
@@ -170,7 +173,9 @@ impl Compiler<'_> {
             self.triangles += report.triangles;
         }
         let material_ids = self.slots.entry(list).or_insert_with_key(|list| list.as_slice().into()).clone();
-        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids, primvars: None })))
+        let &Placement { hidden_from_camera, matte, .. } = placement;
+        let appearance = Appearance { hidden_from_camera, matte };
+        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids, primvars: None, appearance })))
     }
 }
 
@@ -232,7 +237,7 @@ fn build_shapes(
             }
         };
         if let (description::Shape::Mesh(mesh), Some(report)) = (shape, &report) {
-            report_mesh(mesh, report, diagnostics);
+            meshes::report(mesh, report, diagnostics);
         }
         let report = match report {
             None => {
@@ -252,19 +257,6 @@ fn build_shapes(
         shapes.push(Some((compiled, report)));
     }
     Ok(shapes)
-}
-
-fn report_mesh(mesh: &description::Mesh, report: &MeshReport, diagnostics: &mut Diagnostics) {
-    if report.degenerate > 0 {
-        diagnostics.warn(
-            "degenerate-faces",
-            &mesh.path,
-            format!("{} triangles without area are left out", report.degenerate),
-        );
-    }
-    if report.triangles == 0 {
-        diagnostics.warn("empty-mesh", &mesh.path, "it has no face with an area: nothing of it is seen");
-    }
 }
 
 /// What became of a shape.
@@ -319,6 +311,7 @@ fn compile_shape(description: &Description, shape: &description::Shape, names: &
                 uv_number: names.iter().position(|name| mesh.uv_name.as_ref() == Some(name)),
                 primvars: names.iter().map(|name| arrays.named_primvar(mesh, name)).collect::<Result<_>>()?,
                 subsets: &subsets,
+                subdivision: meshes::subdivision(&arrays, mesh, counts)?,
             };
             let normals = polygons.normals.as_ref().map(|normals| normals.values.len());
             let deformation = match &mesh.motion {
@@ -369,7 +362,7 @@ impl<'a> NamedArrays<'a> {
     }
 
     /// Shares the memory of a float array.
-    fn buffer<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
+    pub(super) fn buffer<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
         self.share(name, Element::F32, columns)
     }
 
@@ -420,7 +413,7 @@ impl<'a> NamedArrays<'a> {
         Ok(Ok(Deformation { times: times.clone(), points: moved, normals }))
     }
 
-    fn integers(&self, name: &str) -> Result<&'a [i32]> {
+    pub(super) fn integers(&self, name: &str) -> Result<&'a [i32]> {
         let array = self.get(name, Element::I32, 1)?;
         bytemuck::try_cast_slice(&array.bytes).map_err(|_| {
             Error::scene(self.place, format!("array '{name}' is not aligned to its elements: write the file again"))

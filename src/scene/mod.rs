@@ -8,6 +8,7 @@ pub mod description;
 pub mod file;
 mod manifest;
 pub mod material;
+mod meshes;
 mod objects;
 mod solids;
 mod unroll;
@@ -22,7 +23,7 @@ use crate::texture::{Program, Store};
 use description::{Description, Document};
 pub use manifest::Manifest;
 use material::Material;
-pub use objects::{ConstantPrimvars, Object, ObjectArray, ObjectIds, Objects, PartIds};
+pub use objects::{Appearance, ConstantPrimvars, Object, ObjectArray, ObjectIds, Objects, PartIds};
 
 /// Everything that can be rendered, checked.
 #[derive(Clone, Debug)]

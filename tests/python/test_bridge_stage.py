@@ -66,6 +66,7 @@ def test_stage_metadata_is_as_authored(geometry):
         "up_axis": "Z",
         "time_code": 3.0,
         "frames_per_second": 25.0,
+        "time_codes_per_second": 25.0,
     }
 
 
@@ -110,11 +111,19 @@ def test_only_face_subsets_of_the_material_family_count(geometry):
     assert warned(geometry, "unsupported-subset")[0]["places"] == ["</World/Polygons/points>"]
 
 
-def test_a_subdivision_surface_is_its_control_mesh_without_normals(geometry):
-    assert "normals" not in shape(geometry, "/World/Subdivision")["mesh"]
-    (warning,) = warned(geometry, "subdivision-control-mesh")
-    assert warning["places"] == ["</World/Subdivision>"]
-    assert "catmullClark" in warning["message"] and "normals" in warning["message"]
+def test_a_subdivision_surface_has_no_authored_normals(geometry):
+    mesh = shape(geometry, "/World/Subdivision")["mesh"]
+    assert "normals" not in mesh
+    # USD's own fallbacks, forwarded; the level is the renderer's to choose.
+    assert mesh["subdivision"] == {
+        "scheme": "catmullClark",
+        "interpolate_boundary": "edgeAndCorner",
+        "face_varying_linear_interpolation": "cornersPlus1",
+        "triangle_subdivision_rule": "catmullClark",
+    }
+    (warning,) = warned(geometry, "ignored-normals")
+    assert warning["places"] == ["</World/Subdivision>.normals"]
+    assert "subdivision" not in shape(geometry, "/World/Plain")["mesh"]
 
 
 def test_points_and_transforms_are_those_of_the_frame(geometry):
@@ -316,6 +325,7 @@ def test_a_camera_crosses_as_authored():
         "vertical_aperture_offset": 0.0,
         "focal_length": 20.0,
         "clipping_range": [0.5, 500.0],
+        "clipping_authored": True,
         "f_stop": float(np.float32(2.8)),
         "focus_distance": 12.0,
         "shutter_open": -0.25,
@@ -694,7 +704,8 @@ def test_odd_stage_metadata_is_repaired_with_a_warning():
     assert description.document["stage"]["meters_per_unit"] == 0.01
     assert description.document["stage"]["up_axis"] == "Y"
     assert len(warned(description, "unreadable-attribute")) == 2
-    assert describe(in_memory("")).document["stage"] == {"source": "test.usda", "meters_per_unit": 0.01, "up_axis": "Y"}
+    fallbacks = {"source": "test.usda", "meters_per_unit": 0.01, "up_axis": "Y", "time_codes_per_second": 24.0}
+    assert describe(in_memory("")).document["stage"] == fallbacks
 
 
 def test_without_usd_the_error_says_what_to_install():

@@ -61,6 +61,22 @@ FACE_VERTEX_INDICES: Final = "faceVertexIndices"
 HOLE_INDICES: Final = "holeIndices"
 SUBDIVISION_SCHEME: Final = "subdivisionScheme"
 NO_SUBDIVISION: Final = "none"
+SUBDIVISION_SCHEMES: Final = ("catmullClark", "loop", "bilinear")
+# Options of a subdivision surface with what USD allows, the fallback last.
+INTERPOLATE_BOUNDARY: Final = ("interpolateBoundary", ("none", "edgeOnly", "edgeAndCorner"))
+FACE_VARYING_INTERPOLATION: Final = (
+    "faceVaryingLinearInterpolation",
+    ("none", "cornersOnly", "cornersPlus2", "boundaries", "all", "cornersPlus1"),
+)
+TRIANGLE_RULE: Final = ("triangleSubdivisionRule", ("smooth", "catmullClark"))
+CREASE_INDICES: Final = "creaseIndices"
+CREASE_LENGTHS: Final = "creaseLengths"
+CREASE_SHARPNESSES: Final = "creaseSharpnesses"
+CORNER_INDICES: Final = "cornerIndices"
+CORNER_SHARPNESSES: Final = "cornerSharpnesses"
+SUBDIVISION_LEVEL: Final = "abbe:subdivision:level"
+# usdrecord's names for refinement levels 0 to 3.
+COMPLEXITIES: Final = ("low", "medium", "high", "veryhigh")
 NORMALS: Final = "normals"
 PRIMVARS_NORMALS: Final = "primvars:normals"
 PRIMVARS: Final = "primvars"
@@ -158,6 +174,14 @@ PRIMVAR_READER_TYPES: Final = {
 # Cameras.
 PERSPECTIVE: Final = "perspective"
 CAMERA: Final = "camera"
+# By name, because 24.8 has only the first: what the description calls each.
+EXPOSURE: Final = {
+    "exposure": "stops",
+    "exposure:time": "time",
+    "exposure:iso": "iso",
+    "exposure:fStop": "f_stop",
+    "exposure:responsivity": "responsivity",
+}
 
 # Render settings.
 RENDER_SETTINGS: Final = "RenderSettings"
@@ -184,6 +208,15 @@ COLOR3F: Final = "color3f"
 SOURCE_NAME: Final = "sourceName"
 SOURCE_TYPE: Final = "sourceType"
 RAW: Final = "raw"
+RENDER_PASS: Final = "RenderPass"
+RENDER_SOURCE: Final = "renderSource"
+INPUT_PASSES: Final = "inputPasses"
+COMMAND: Final = "command"
+FILE_NAME: Final = "fileName"
+PRUNE: Final = "prune"
+RENDER_VISIBILITY: Final = "renderVisibility"
+CAMERA_VISIBILITY: Final = "cameraVisibility"
+MATTE: Final = "matte"
 # Later ones win, so that RenderMan's spelling yields to the common one.
 DRIVER_NAMESPACES: Final = ("ri:driver:parameters", "driver:parameters")
 AOV_DRIVER_NAMESPACES: Final = ("ri:driver:parameters:aov", "driver:parameters:aov")
@@ -227,6 +260,7 @@ LENS_NAMES: Final = {
     "abbe:lens:back:aspheres": "double[]",
     "abbe:lens:back:semiDiameter": "double",
 }
+MESH_NAMES: Final = {SUBDIVISION_LEVEL: "int"}
 SCALAR_IOR: Final = "abbe:scalarIor"
 SETTINGS_NAMES: Final = {
     "abbe:integrator": "token",
@@ -251,7 +285,7 @@ VAR_NAMES: Final = {
 }
 OUR_SCHEMAS: Final = {
     "Material": MATERIAL_NAMES,
-    "Mesh": LENS_NAMES,
+    "Mesh": {**LENS_NAMES, **MESH_NAMES},
     "Xform": LENS_NAMES,
     RENDER_SETTINGS: SETTINGS_NAMES,
     RENDER_VAR: VAR_NAMES,

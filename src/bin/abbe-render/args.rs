@@ -19,6 +19,7 @@ What is not given, the scene's render settings decide.
   --product PATH           the one product to render
   --width N, --height N    pixels; one alone keeps the aspect
   --samples N              samples per pixel
+  --depth-of-field on|off  spread samples over the lens, or not; as the scene says unless given
   --integrator NAME        what computes a pixel
   --aov NAME               an AOV to render, instead of the scene's; repeat for more
   --wavelength NM          reference wavelength
@@ -83,6 +84,13 @@ fn read(mut parser: lexopt::Parser) -> Result<Command> {
             "width" => request.width = Some(number(&mut parser, &option)?),
             "height" => request.height = Some(number(&mut parser, &option)?),
             "samples" => request.samples = Some(number(&mut parser, &option)?),
+            "depth-of-field" => {
+                request.depth_of_field = Some(match text(&mut parser, &option)?.as_str() {
+                    "on" => true,
+                    "off" => false,
+                    other => return Err(Error::usage("--depth-of-field", format!("'{other}' is neither on nor off"))),
+                });
+            }
             "integrator" => request.integrator = Some(text(&mut parser, &option)?),
             "aov" => request.aovs.get_or_insert_default().push(text(&mut parser, &option)?),
             "wavelength" => request.wavelength = Some(number(&mut parser, &option)?),
