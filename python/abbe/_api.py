@@ -60,6 +60,7 @@ class Options(TypedDict, total=False):
     dispersion_scale: float | None
     seed: int | None
     threads: int | None
+    texture_memory: int | None
     crop: tuple[int, int, int, int] | None
     sample_range: tuple[int, int] | None
     strict: bool
@@ -168,7 +169,7 @@ class Scene:
         session_layer : a layer stronger than all of the stage, which is not changed
         mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
         payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
-        missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+        missing : what to do where a layer, prim or texture that is referred to is missing: ``"warn"`` or ``"error"``
         complexity : ``"low"``, ``"medium"``, ``"high"``, ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
             ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
         scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
@@ -234,19 +235,20 @@ class Scene:
         """
         return cls(_core.Scene.load(Path(path), mapped=mapped))
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str], *, embed: bool = False) -> None:
         """Write the scene to a file for :meth:`load` and the program ``abbe-render``.
 
         Parameters
         ----------
         path : where to; complete or not at all
+        embed : put what is in the image files into it; else it names them by their absolute paths
 
         Raises
         ------
         AbbeError
             It cannot be written.
         """
-        self._core.save(Path(path))
+        self._core.save(Path(path), embed=embed)
 
     def __repr__(self) -> str:
         document = self.document
@@ -416,6 +418,7 @@ def render(
     dispersion_scale: float | None = None,
     seed: int | None = None,
     threads: int | None = None,
+    texture_memory: int | None = None,
     crop: tuple[int, int, int, int] | None = None,
     sample_range: tuple[int, int] | None = None,
     purposes: Sequence[str] | None = None,
@@ -454,6 +457,7 @@ def render(
     dispersion_scale : multiplies all dispersion: 0 none, 1 physical
     seed : same seed, same bits, on any number of threads
     threads : all of the machine's if None
+    texture_memory : for the texels of images, MB, 4294 if None; what does not fit goes to a temporary file
     crop : x0, y0, x1, y1 in pixels, half-open, y down
     sample_range : begin and end, half-open: a part that :func:`merge` joins with others
     purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, complexity, scalar_ior : as for
@@ -511,6 +515,7 @@ def render(
         dispersion_scale=dispersion_scale,
         seed=seed,
         threads=threads,
+        texture_memory=texture_memory,
         crop=crop,
         sample_range=sample_range,
         strict=strict,

@@ -90,6 +90,8 @@ impl Aov {
 const XYZ: &[&str] = &["X", "Y", "Z"];
 const XY: &[&str] = &["X", "Y"];
 const UV: &[&str] = &["U", "V"];
+/// A colour: the one thing that is R, G, B.
+const RGB: &[&str] = &["R", "G", "B"];
 const X: &[&str] = &["X"];
 const Z: &[&str] = &["Z"];
 const I: &[&str] = &["I"];
@@ -110,6 +112,11 @@ const fn first(name: &'static str, unit: &'static str, family: Family, doc: &'st
 
 /// The one AOV that the absorption of media is summed for.
 pub const INTERNAL_TRANSMITTANCE: &str = "internal_transmittance";
+
+/// Whether an AOV is that of a surface's color.
+pub fn is_albedo(aov: &Aov) -> bool {
+    matches!(aov.name, "albedo" | "refracted_albedo")
+}
 
 /// Every AOV of the geometric and differential passes.
 pub static AOVS: &[Aov] = &[
@@ -218,6 +225,13 @@ pub static AOVS: &[Aov] = &[
     ),
     mean("uv", UV, "1", Family::FirstSurface, "texture coordinates of the first surface"),
     mean(
+        "albedo",
+        RGB,
+        "1",
+        Family::FirstSurface,
+        "what denoisers expect of the first surface, linear Rec. 709: base color of what is diffuse, reflectance at normal incidence of a metal, tint of what transmits (1 for clear glass), displayColor where there is no material",
+    ),
+    mean(
         "refracted_depth",
         Z,
         "stage unit",
@@ -246,6 +260,7 @@ pub static AOVS: &[Aov] = &[
         "unit geometric normal at the chain's end, world space, outward as authored",
     ),
     mean("refracted_uv", UV, "1", Family::Chain, "texture coordinates at the chain's end"),
+    mean("refracted_albedo", RGB, "1", Family::Chain, "albedo at the chain's end: of what is seen through the glass"),
     first(
         "prim_id",
         "index",
@@ -283,6 +298,7 @@ pub static ALIASES: &[(&str, &str)] = &[
     ("Nn", "normal"),
     ("Ng", "normal_geometric"),
     ("st", "uv"),
+    ("Albedo", "albedo"),
     ("Ci", "color"),
     ("C", "color"),
     ("RGBA", "color"),

@@ -11,6 +11,7 @@ use super::layers::{PlannedLayer, layers};
 use super::request::Request;
 use super::settings::{self, Attributes};
 use super::shot::{DepthOfField, Shot};
+use super::textures;
 use super::validity;
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
@@ -95,6 +96,8 @@ pub struct Plan {
     pub seed: u64,
     /// Threads, 0 for all.
     pub threads: usize,
+    /// Memory for the texels of images, bytes.
+    pub texture_memory: u64,
     /// Name of the integrator.
     pub integrator: String,
     /// Layers in the film's order.
@@ -165,6 +168,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     };
     let driver = product.map(|p| Driver::new(p, &mut diagnostics)).unwrap_or_default();
     attributes.warn_of_unused(&mut diagnostics);
+    textures::report_missing(scene, &needs, &mut diagnostics);
     if request.strict {
         refuse_warnings(&[scene.diagnostics(), &diagnostics])?;
     }
@@ -182,6 +186,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         samples,
         seed,
         threads: settings::threads(request)?,
+        texture_memory: textures::memory(request)?,
         integrator: integrator.name().to_owned(),
         layers,
         optics,
@@ -302,11 +307,8 @@ fn reasons(
             None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
         }
     }
-    note(
-        false,
-        "light sampling, emission, textures",
-        format!("the integrator '{}' has no use for them", integrator.name()),
-    );
+    textures::decide(scene, layers, needs, &mut note);
+    note(false, "light sampling, emission", format!("the integrator '{}' has no use for them", integrator.name()));
     if scene.objects.hides_some() {
         note(
             true,

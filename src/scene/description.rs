@@ -500,6 +500,38 @@ pub struct Material {
     /// The surface shaders of the terminals after it, in the same order, each shader once.
     #[serde(default)]
     pub alternatives: Vec<Shader>,
+    /// The nodes behind inputs that are no constants, each behind those that it is connected to.
+    #[serde(default)]
+    pub nodes: Vec<Node>,
+}
+
+/// A node of a shading network as authored.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Node {
+    /// Prim path.
+    pub path: String,
+    /// `info:id`, for instance `UsdUVTexture` or `ND_multiply_color3`.
+    pub id: String,
+    /// Authored constant inputs by name without `inputs:`, connections to constants followed.
+    #[serde(default)]
+    pub inputs: AuthoredMap,
+    /// Inputs that other nodes drive.
+    #[serde(default)]
+    pub connected: BTreeMap<String, NodeOutput>,
+    /// Inputs that name an image: index into [`Document::textures`].
+    #[serde(default)]
+    pub textures: BTreeMap<String, usize>,
+}
+
+/// One output of a node.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NodeOutput {
+    /// Index into [`Material::nodes`]; of a node's input one before the node's own.
+    pub node: usize,
+    /// Name of the output without `outputs:`.
+    pub output: String,
 }
 
 /// A surface shader as authored.
@@ -519,6 +551,9 @@ pub struct Shader {
     /// Inputs driven by a network: name → the path of the output that drives it.
     #[serde(default)]
     pub connected: BTreeMap<String, String>,
+    /// The same inputs, to the nodes of the material that drive them.
+    #[serde(default)]
+    pub networks: BTreeMap<String, NodeOutput>,
     /// Authored `inputs:abbe:…`, keyed without `inputs:`, connections followed.
     #[serde(default)]
     pub abbe: AuthoredMap,

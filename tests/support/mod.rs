@@ -70,9 +70,11 @@ impl Stagehand {
                 terminal: "outputs:surface".into(),
                 inputs: map(inputs),
                 connected: BTreeMap::new(),
+                networks: BTreeMap::new(),
                 abbe: BTreeMap::new(),
             }),
             alternatives: Vec::new(),
+            nodes: Vec::new(),
         });
         self.document.materials.len() - 1
     }

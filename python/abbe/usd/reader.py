@@ -28,6 +28,7 @@ from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
 from .passes import Appearance, RenderPass, find_pass
 from .places import Places
+from .primvars import PrimvarReader
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import OpenedStage, Opening, open_stage, source_name
@@ -423,6 +424,7 @@ class _Walk:
             prims.append(placed.prim)
             prims.extend(placed.prim.GetChild(name) for name in self.shapes.subset_names[placed.shape])
         bound = iter(materials.bound(prims))
+        primvars = PrimvarReader(self.shapes, self.time, self.diagnostics)
         for placed in placements:
             material = next(bound)
             if material is not None:
@@ -430,6 +432,11 @@ class _Walk:
             names = self.shapes.subset_names[placed.shape]
             if names:
                 placed.item["subset_materials"] = [next(bound) for _ in names]
+            used = {material, *placed.item.get("subset_materials", ())}
+            looked_up = {name for index in used if index is not None for name in materials.primvars[index]}
+            if None in used:
+                looked_up.add(tokens.DISPLAY_COLOR)
+            primvars.add(placed.prim, placed.shape, looked_up, placed.item)
         groups: list[dict[str, Any]] = []
         for group in self.groups:
             groups.append({"path": group.path, "items": [placed.item for placed in group.placed]})
@@ -554,7 +561,7 @@ def _read(
     walk = _Walk(opened, time, shown, active_pass, refinement_level(complexity), diagnostics)
     walk.run()
     assets = AssetReader(stage, time)
-    materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim))
+    materials = MaterialReader(time, diagnostics, _binding_purposes(settings_prim), assets)
     groups = walk.bind(materials)
 
     cameras: list[dict[str, Any]] = []
@@ -626,12 +633,10 @@ def _purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[str]:
     return frozenset([tokens.DEFAULT, *wanted])
 
 
-def _binding_purpose(settings: Any) -> str:
-    """Return the material purpose: the first of the settings' that is not the all-purpose one."""
+def _binding_purposes(settings: Any) -> Sequence[str]:
+    """Return the material purposes in the order in which they count: the settings', else full and all-purpose."""
     authored = None if settings is None else token_list(settings, tokens.MATERIAL_BINDING_PURPOSES)
-    if authored is None:
-        return tokens.FULL_PURPOSE
-    return next(filter(None, authored), str(UsdShade.Tokens.allPurpose))
+    return tokens.BINDING_PURPOSES if authored is None else authored
 
 
 def default_camera(stage: Any, settings: Any, cameras: list[Any]) -> Any:

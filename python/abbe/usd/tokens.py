@@ -100,10 +100,17 @@ INDICES: Final = "indices"
 
 # Materials.
 MATERIAL_BINDING: Final = "material:binding"
-FULL_PURPOSE: Final = "full"
+COLLECTION: Final = "collection"
+# The all-purpose binding has no name.
+BINDING_PURPOSES: Final = ("full", "")
 OUTPUTS_PREFIX: Final = "outputs:"
 INPUTS: Final = "inputs"
 INPUTS_PREFIX: Final = "inputs:"
+# Nodes that read texture coordinates by their number, and the color of the geometry.
+TEXTURE_COORDINATE_NODES: Final = "ND_texcoord_"
+GEOMETRY_COLOR_NODES: Final = "ND_geomcolor_"
+ST: Final = "st"
+DISPLAY_COLOR: Final = "displayColor"
 # Where in the name of an image the number of its tile stands.
 TILE_PATTERNS: Final = ("<UDIM>",)
 INFO: Final = "info"
