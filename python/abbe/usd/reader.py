@@ -26,7 +26,7 @@ from .instancers import InstancerReader
 from .lenses import is_lens
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
-from .passes import Appearance, RenderPass, find_pass
+from .passes import ActivePass, Appearance, find_pass
 from .places import Places
 from .primvars import PrimvarReader
 from .render import find_settings, read_settings, token_list
@@ -139,7 +139,7 @@ class _Walk:
         opened: OpenedStage,
         time: Any,
         purposes: frozenset[str],
-        render_pass: RenderPass | None,
+        render_pass: ActivePass | None,
         level: int | None,
         diagnostics: Diagnostics,
     ) -> None:
