@@ -43,7 +43,7 @@ impl Stagehand {
                 frames_per_second: Some(24.0),
             },
             shapes: vec![],
-            groups: vec![Group { path: "/".into(), items: vec![], instances: vec![] }],
+            groups: vec![Group { path: "/".into(), ..Group::default() }],
             root: 0,
             materials: vec![],
             cameras: vec![],
@@ -52,6 +52,7 @@ impl Stagehand {
             skipped: BTreeMap::new(),
             textures: Vec::new(),
             strict_assets: false,
+            link_sets: Vec::new(),
         };
         Self { document, arrays: Arrays::new() }
     }
@@ -179,10 +180,8 @@ impl Stagehand {
             path: path.into(),
             target: Target::Shape(shape),
             transform: Some(transform.to_cols_array()),
-            instance: None,
             material,
-            subset_materials: vec![],
-            double_sided: false,
+            ..Placement::default()
         });
     }
 
