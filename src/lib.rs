@@ -15,6 +15,7 @@
 //! | [`optics`] | n(λ) and its derivatives, absorption, media and their priorities |
 //! | [`ray`] | columns, transfer, scattering, footprint, chromatic motion: the calculus |
 //! | [`geometry`] | shapes, instances, trees, hits |
+//! | [`light`] | what shines: shapes, spectra, profiles |
 //! | [`camera`], [`sampler`] | where rays begin |
 //! | [`scene`] | the description, its checks, the compiled scene |
 //! | [`film`] | the AOV table, layers, sums independent of grouping |
@@ -34,6 +35,7 @@ pub mod exr;
 pub mod film;
 pub mod geometry;
 pub mod integrator;
+pub mod light;
 pub mod math;
 pub mod optics;
 pub mod ray;

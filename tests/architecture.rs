@@ -11,6 +11,7 @@ const LAYERS: &[&[&str]] = &[
     &["optics"],
     &["ray"],
     &["geometry"],
+    &["light"],
     &["sampler"],
     &["scene", "camera"],
     &["film"],
