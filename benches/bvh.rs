@@ -51,6 +51,8 @@ fn mesh(points: &Buffer<[f32; 3]>, counts: &[i32], indices: &[i32]) -> Mesh {
         left_handed: false,
         normals: None,
         uv: None,
+        uv_number: None,
+        primvars: Vec::new(),
         subsets: &[],
     };
     Mesh::from_polygons(&polygons).expect("a ball").0
@@ -60,7 +62,7 @@ fn scene(rings: usize) -> Aggregate {
     let (points, indices) = ball(rings);
     let counts = vec![3; indices.len() / 3];
     let shape = Arc::new(Shape::Mesh(mesh(&Buffer::from_vec(points), &counts, &indices)));
-    Aggregate::build(&[Instance { shape, world_from_object: DAffine3::IDENTITY }], DVec3::ZERO)
+    Aggregate::build(&[Instance { shape, world_from_object: DAffine3::IDENTITY.into() }], DVec3::ZERO)
 }
 
 fn shoot(bencher: Bencher<'_, '_>, rings: usize, rays: &[Ray]) {
@@ -77,7 +79,7 @@ fn primary(bencher: Bencher<'_, '_>, rings: usize) {
         .map(|i| {
             let at = |k: u32| (f64::from(k) + 0.5) / f64::from(SIDE) - 0.5;
             let direction = DVec3::new(at(i % SIDE) * 0.8, at(i / SIDE) * 0.8, -1.0).normalize();
-            Ray { origin: DVec3::new(0.0, 0.0, 3.5), direction }
+            Ray { origin: DVec3::new(0.0, 0.0, 3.5), direction, time: 0.0 }
         })
         .collect();
     shoot(bencher, rings, &rays);
@@ -93,7 +95,7 @@ fn random(bencher: Bencher<'_, '_>, rings: usize) {
             let phi = std::f64::consts::TAU * weyl(i, 0.671_043_606_703_789_2);
             let r = (1.0 - z * z).sqrt();
             let origin = 0.9 * DVec3::new(weyl(i, 0.549_700_477_901_970_3) - 0.5, weyl(i, 0.45) - 0.5, 0.0);
-            Ray { origin, direction: DVec3::new(r * phi.cos(), r * phi.sin(), z) }
+            Ray { origin, direction: DVec3::new(r * phi.cos(), r * phi.sin(), z), time: 0.0 }
         })
         .collect();
     shoot(bencher, rings, &rays);

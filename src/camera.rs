@@ -152,6 +152,7 @@ impl Camera {
                 direction_xx: DVec3::ZERO,
                 direction_xy: DVec3::ZERO,
                 direction_yy: DVec3::ZERO,
+                time: 0.0,
             };
         }
         let big_d = self.look + x * self.right + y * self.up;
@@ -176,6 +177,7 @@ impl Camera {
             direction_xx: second(along_a, d_a, along_a, d_a),
             direction_xy: second(along_a, d_a, along_b, d_b),
             direction_yy: second(along_b, d_b, along_b, d_b),
+            time: 0.0,
         }
     }
 

@@ -25,6 +25,17 @@ fn assert_says(error: &Error, place: &str, words: &str) {
     assert!(!text.contains('\n'), "'{text}' is more than one line");
 }
 
+/// What the stage says of one prim and nobody can render: that prim is left out and named, the rest is there.
+fn assert_left_out(description: Description, kind: &str, place: &str, words: &str) {
+    let others = ball().build().objects.len();
+    let scene = Scene::build(description).expect("the rest is rendered");
+    assert_eq!(scene.objects.len(), others, "{place}");
+    let warning = scene.diagnostics().warnings().iter().find(|w| w.kind == kind).expect("a warning");
+    assert!(warning.places[0].starts_with(place), "{warning:?} does not begin with '{place}'");
+    assert!(warning.message.contains(words), "{warning:?} does not say '{words}'");
+    assert!(!warning.message.contains('\n'), "{warning:?} is more than one line");
+}
+
 fn with_mesh(points: &[[f32; 3]], faces: &[&[i32]]) -> Description {
     let mut s = ball();
     s.mesh("/World/Mesh", points, faces, DMat4::IDENTITY, None);
@@ -34,15 +45,16 @@ fn with_mesh(points: &[[f32; 3]], faces: &[&[i32]]) -> Description {
 const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
 #[test]
-fn broken_topology_names_the_mesh() {
-    assert_says(&error(with_mesh(&TRIANGLE, &[&[0, 1, 3]])), "/World/Mesh", "3");
-    assert_says(&error(with_mesh(&TRIANGLE, &[&[0, 1, -1]])), "/World/Mesh", "-1");
+fn a_mesh_with_broken_topology_is_left_out() {
+    let says = |description, words: &str| assert_left_out(description, "broken-shape", "/World/Mesh.", words);
+    says(with_mesh(&TRIANGLE, &[&[0, 1, 3]]), "index 2 is 3, but there are 3 points");
+    says(with_mesh(&TRIANGLE, &[&[0, 1, -1]]), "-1");
     let mut nan = TRIANGLE;
     nan[1][2] = f32::NAN;
-    assert_says(&error(with_mesh(&nan, &[&[0, 1, 2]])), "/World/Mesh", "finite");
+    says(with_mesh(&nan, &[&[0, 1, 2]]), "finite");
     let mut wrong_sum = with_mesh(&TRIANGLE, &[&[0, 1, 2]]);
     wrong_sum.arrays.insert("shape2.counts".into(), Array::from_vec(Element::I32, 1, vec![4i32]));
-    assert_says(&error(wrong_sum), "/World/Mesh", "");
+    says(wrong_sum, "counts add up to 4, but faceVertexIndices has 3");
 }
 
 #[test]
@@ -120,9 +132,15 @@ fn indices_out_of_range_are_refused() {
 
 #[test]
 fn transforms_are_checked() {
-    let mut description = ball().description();
-    description.document.groups[0].items[0].transform = Some([f64::NAN; 16]);
-    assert_says(&error(description), "/World/Wall", "finite");
+    let mut projective = DMat4::IDENTITY.to_cols_array();
+    projective[7] = 0.5;
+    for (transform, words) in [([f64::NAN; 16], "not finite"), (projective, "projective")] {
+        let mut description = ball().description();
+        let mut moved = description.document.groups[0].items[0].clone();
+        (moved.path, moved.transform) = ("/World/Moved".into(), Some(transform));
+        description.document.groups[0].items.push(moved);
+        assert_left_out(description, "broken-transform", "/World/Moved", words);
+    }
     // Scaled to nothing is how animators hide things: left out, and said so.
     let mut s = ball();
     s.sphere("/World/Flat", 1.0, DMat4::from_scale(glam::DVec3::new(1.0, 0.0, 1.0)), None);
@@ -134,18 +152,21 @@ fn transforms_are_checked() {
 }
 
 #[test]
-fn a_sphere_without_a_size_is_refused() {
-    for radius in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let mut description = ball().description();
-        if let Shape::Sphere { radius: r, .. } = &mut description.document.shapes[1] {
-            *r = radius;
-        }
-        assert_says(&error(description), "/World/Ball.radius", "positive");
+fn a_sphere_without_a_size_is_left_out() {
+    for (radius, kind, words) in [
+        (0.0, "empty-shape", "size is 0"),
+        (-1.0, "broken-shape", "is -1: it must be positive"),
+        (f64::NAN, "broken-shape", "NaN"),
+        (f64::INFINITY, "broken-shape", "inf"),
+    ] {
+        let mut s = ball();
+        s.sphere("/World/Other", radius, DMat4::IDENTITY, None);
+        assert_left_out(s.description(), kind, "/World/Other", words);
     }
 }
 
 #[test]
-fn solids_without_a_size_are_left_out_or_refused() {
+fn solids_without_a_size_are_left_out() {
     let solids = |size: f64| {
         let (path, axis) = (|| "/World/Solid".to_owned(), || "X".to_owned());
         [
@@ -169,7 +190,8 @@ fn solids_without_a_size_are_left_out_or_refused() {
     for (name, solid) in [-1.0, f64::NAN, f64::INFINITY].into_iter().flat_map(solids) {
         let mut s = ball();
         s.solid(solid, DMat4::IDENTITY, None);
-        assert_says(&error(s.description()), &format!("/World/Solid.{name}"), "must be finite and not negative");
+        let place = format!("/World/Solid.{name}");
+        assert_left_out(s.description(), "broken-shape", &place, "must be finite and not negative");
     }
     for (_, solid) in solids(0.0) {
         let mut s = ball();
@@ -181,12 +203,17 @@ fn solids_without_a_size_are_left_out_or_refused() {
     }
     let mut s = ball();
     s.solid(Shape::Cone { path: "/C".into(), height: 1.0, radius: 1.0, axis: "W".into() }, DMat4::IDENTITY, None);
-    assert_says(&error(s.description()), "/C.axis", "X, Y or Z");
+    assert_left_out(s.description(), "broken-shape", "/C.axis", "X, Y or Z");
     // No sphere touches a cone that is flat.
     let mut s = ball();
     let flat = Shape::Capsule { path: "/C".into(), height: 0.0, radius_bottom: 1.0, radius_top: 2.0, axis: "Z".into() };
     s.solid(flat, DMat4::IDENTITY, None);
-    assert_says(&error(s.description()), "/C", "height 0, radiusBottom 1, radiusTop 2: there is no such solid");
+    assert_left_out(
+        s.description(),
+        "broken-shape",
+        "/C",
+        "height 0, radiusBottom 1, radiusTop 2: there is no such solid",
+    );
 }
 
 #[test]

@@ -158,7 +158,7 @@ fn lenses_and_solids_of_an_array_are_those_placed_one_by_one() {
     let mut elements = 0;
     for (i, j) in (-30..=30).flat_map(|i| (-24..=24).map(move |j| (i, j))) {
         let direction = DVec3::new(0.1 * f64::from(i), 0.1 * f64::from(j), -12.0).normalize();
-        let ray = Ray { origin: DVec3::ZERO, direction };
+        let ray = Ray { origin: DVec3::ZERO, direction, time: 0.0 };
         let hits = [&array_view, &plain_view].map(|view| view.intersect(&ray, &Departures::none()));
         assert_eq!(hits[0], hits[1]);
         let Some(hit) = hits[0] else { continue };
@@ -279,11 +279,19 @@ fn broken_arrays_name_the_instancer() {
     assert!(broken(&element((0..11).collect())).contains("11 indices for 12 transforms"));
     assert!(broken(&element((1..13).collect())).contains("element 12 of 12"));
     assert!(broken(&element((-1..11).collect())).contains("element -1"));
-    let mut lost = [0.0; 16];
-    lost[0] = f64::INFINITY;
-    assert!(broken(&|d| d.document.groups[0].instances[0].transform = Some(lost)).contains("finite"));
     let flat = Array::from_vec(Element::F64, 3, vec![0.0; 36]);
     assert!(broken(&|d| drop(d.arrays.insert("places".into(), flat.clone()))).contains("12 columns"));
+}
+
+#[test]
+fn an_instancer_that_stands_nowhere_is_left_out_and_named() {
+    let mut lost = by_array();
+    lost.document.groups[0].instances[0].transform = Some([f64::INFINITY; 16]);
+    let others = lost.document.groups[0].items.len();
+    let scene = Scene::build(lost).expect("the rest is rendered");
+    assert_eq!(scene.objects.len() as usize, others);
+    let warnings = scene.diagnostics().warnings();
+    assert!(warnings.iter().any(|w| w.kind == "broken-transform" && w.places == ["/World/Lamps"]), "{warnings:?}");
 }
 
 #[test]

@@ -1025,6 +1025,7 @@ fn degenerate_input_gives_no_surprise() {
         direction_xx: DVec3::ZERO,
         direction_xy: DVec3::ZERO,
         direction_yy: DVec3::ZERO,
+        time: 0.0,
     };
     let none = second_order_along(&start, &IorJet::VACUUM, DVec3::ZERO, &[]);
     assert_eq!((none.point2, none.momentum2), (DVec3::ZERO, DVec3::ZERO));

@@ -225,6 +225,7 @@ fn compare(system: &[Surface], aim: f64) -> ([f64; 3], usize) {
                     direction_xx: zero,
                     direction_xy: zero,
                     direction_yy: zero,
+                    time: 0.0,
                 };
                 let (o, d) = (Vector::new(origin.to_array()), Vector::new(direction.to_array()));
                 let (exact, _, fits) = sequential(system, &o, &d, &Real::new(nanometers));

@@ -92,6 +92,7 @@ fn start(x: f64, y: f64) -> RayStart {
         direction_xx: second(right, right, d_x, d_x),
         direction_xy: second(right, up, d_x, d_y),
         direction_yy: second(up, up, d_y, d_y),
+        time: 0.0,
     }
 }
 

@@ -152,6 +152,7 @@ fn case_01_the_spot_on_a_grazed_surface_grows_as_the_flux_per_area_falls() {
             direction_xx: -direction,
             direction_xy: DVec3::ZERO,
             direction_yy: -direction,
+            time: 0.0,
         };
         let mut columns = ScreenColumns::start(&bare, &IorJet::VACUUM);
         let transfer = Transfer {

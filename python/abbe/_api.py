@@ -445,7 +445,7 @@ def render(
     sample_range : begin and end, half-open: a part that :func:`merge` joins with others
     purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, scalar_ior : as for
         :meth:`Scene.from_stage`
-    strict : what would be a warning about the request, or a missing camera, is an error
+    strict : any warning, of the stage or the request, is an error
     progress : called about ten times a second; ``print`` will do
 
     Returns

@@ -259,7 +259,7 @@ fn methods(tracer: &Tracer<'_>, nm: f64, cases: &[Case], rounds: usize) -> Resul
                 let mut counters = Counters::default();
                 let _: Chain<NoColumns> =
                     tracer.follower.follow(start, media, Record::of_steps(&mut log), &mut counters);
-                let medium = tracer.follower.start_medium(media);
+                let medium = tracer.follower.start_medium(media, start.time);
                 Some(single::lambda_column(start, &medium, &log))
             })
         }),
@@ -310,7 +310,7 @@ fn methods(tracer: &Tracer<'_>, nm: f64, cases: &[Case], rounds: usize) -> Resul
 
 fn predictions(tracer: &Tracer<'_>, nm: f64, cases: &[Case]) -> Result<Vec<Prediction>> {
     let media = tracer.media(nm)?;
-    let medium = tracer.follower.start_medium(&media);
+    let medium = tracer.follower.start_medium(&media, 0.0);
     let [mut here, mut there] = [Vec::new(), Vec::new()];
     let mut rows = Vec::new();
     for delta in DISTANCES {
@@ -355,7 +355,7 @@ fn costs(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart], rounds: usize) -> Re
     let second_chain = || {
         let mut counters = Counters::default();
         let mut log = Vec::new();
-        let medium = tracer.follower.start_medium(&media);
+        let medium = tracer.follower.start_medium(&media, 0.0);
         let begin = Instant::now();
         for start in starts {
             let chain = tracer.follower.follow::<ScreenColumns>(

@@ -3,12 +3,14 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
+use super::departures::Crossing;
 use super::mesh::{Mesh, MeshHit};
-use super::placed::{Frame, ObjectRay, Placed, is_invertible};
-use super::start::{Met, Relation, Start, behind, relation};
+use super::motion::Pose;
+use super::placed::{Frame, ObjectRay, Placed, bounds_under, is_invertible};
+use super::start::{Met, Relation, Start, UNIT_ROUNDOFF, behind, relation};
 use super::tree::{Bounds, Tree};
 use super::{Departures, Hit, Instance, InstanceArray, Location, Numbering, Ray, Shape};
 use crate::ray::LocalSurface;
@@ -16,8 +18,10 @@ use crate::ray::LocalSurface;
 /// Everything that rays can meet.
 #[derive(Debug)]
 pub struct Aggregate {
-    singles: Vec<(Arc<Shape>, Frame)>,
+    singles: Vec<(Arc<Shape>, Standing)>,
     arrays: Vec<InstanceArray>,
+    /// Per array, whether anything of it moves.
+    is_array_moving: Vec<bool>,
     numbering: Numbering,
     /// The point of the stage's world that is render space's zero.
     origin: DVec3,
@@ -28,6 +32,24 @@ pub struct Aggregate {
     spread: f64,
     farthest: f64,
 }
+
+/// A single instance.
+#[derive(Debug)]
+enum Standing {
+    Still(Frame),
+    Moving(Pose),
+}
+
+/// Where an instance is, at all times.
+struct Extent {
+    bounds: Bounds,
+    condition: f64,
+    farthest: f64,
+}
+
+/// A moving transform is looked at at its samples and at quarters between them: its condition elsewhere may be this many times
+/// larger. An instance is not there at times at which it is worse: it is being flattened.
+const UNSEEN_CONDITION: f64 = 4.0;
 
 impl Aggregate {
     /// Builds the tree over `instances` relative to `origin`, the point of the stage's world that is render space's zero.
@@ -43,11 +65,19 @@ impl Aggregate {
     pub fn with_arrays(singles: &[Instance], mut arrays: Vec<InstanceArray>, origin: DVec3) -> Self {
         arrays.retain(|array| !array.is_empty());
         let numbering = Numbering::new(singles.len(), arrays.iter().map(|a| (a.places.len(), a.parts.len())));
-        let singles =
-            singles.iter().map(|i| (Arc::clone(&i.shape), Frame::new(&i.world_from_object, origin))).collect();
+        let standing = |pose: &Pose| {
+            if pose.is_moving() {
+                Standing::Moving(pose.clone())
+            } else {
+                Standing::Still(Frame::new(pose.frame(), origin))
+            }
+        };
+        let singles = singles.iter().map(|i| (Arc::clone(&i.shape), standing(&i.world_from_object))).collect();
+        let is_array_moving = arrays.iter().map(InstanceArray::is_moving).collect();
         let mut all = Self {
             singles,
             arrays,
+            is_array_moving,
             numbering,
             origin,
             tree: Tree::default(),
@@ -56,11 +86,11 @@ impl Aggregate {
             farthest: 0.0,
         };
         let count = all.numbering.len();
-        let in_tree: Vec<u32> = (0..count).into_par_iter().filter(|&i| all.bounds_of(i).is_some()).collect();
+        let in_tree: Vec<u32> = (0..count).into_par_iter().filter(|&i| all.extent_of(i).is_some()).collect();
         // The largest of some numbers does not depend on their grouping.
         let (spread, farthest) = in_tree
             .par_iter()
-            .map(|&i| all.with(i, |placed| (placed.condition(), placed.translation.abs().max_element())))
+            .filter_map(|&i| all.extent_of(i).map(|extent| (extent.condition, extent.farthest)))
             .reduce(|| (1.0, 0.0), |a, b| (f64::max(a.0, b.0), f64::max(a.1, b.1)));
         (all.spread, all.farthest) = (spread, farthest);
         all.instances = (in_tree.len() < count as usize).then_some(in_tree);
@@ -76,19 +106,32 @@ impl Aggregate {
         self.instances.as_ref().map_or(i, |instances| instances[i as usize])
     }
 
-    /// Calls `f` with an instance made ready: a single one as it is kept, one of an array as it is computed.
-    fn with<R>(&self, instance: u32, f: impl FnOnce(Placed<'_>) -> R) -> R {
+    /// Calls `f` with an instance made ready: a single one as it is kept, one of an array or one that moves as it is
+    /// computed. `None` if it is not there at that time.
+    fn with<R>(&self, instance: u32, time: f64, f: impl FnOnce(Placed<'_>) -> R) -> Option<R> {
         match self.numbering.locate(instance) {
-            Location::Single(i) => {
-                let (shape, frame) = &self.singles[i];
-                f(Placed { shape, frame })
-            }
+            Location::Single(i) => match &self.singles[i] {
+                (shape, Standing::Still(frame)) => Some(f(Placed { shape, frame, time })),
+                (shape, Standing::Moving(pose)) => {
+                    let frame = &self.moved(&pose.at(time))?;
+                    Some(f(Placed { shape, frame, time }))
+                }
+            },
             Location::InArray { array, place, part } => {
+                let is_moving = self.is_array_moving[array];
                 let array = &self.arrays[array];
-                let frame = Frame::new(&array.world_from_object(place, part), self.origin);
-                f(Placed { shape: &array.parts[part].shape, frame: &frame })
+                let transform = array.world_from_object(place, part, time);
+                let frame = if is_moving { self.moved(&transform)? } else { Frame::new(&transform, self.origin) };
+                Some(f(Placed { shape: &array.parts[part].shape, frame: &frame, time }))
             }
         }
+    }
+
+    /// What moves, at a time; `None` where it is flattened then.
+    fn moved(&self, transform: &DAffine3) -> Option<Frame> {
+        is_invertible(transform)
+            .then(|| Frame::new(transform, self.origin))
+            .filter(|frame| frame.condition() <= self.spread)
     }
 
     fn shape(&self, instance: u32) -> &Shape {
@@ -98,14 +141,91 @@ impl Aggregate {
         }
     }
 
-    /// Bounds of an instance in render space; `None` where it has no extent or its place is singular.
-    fn bounds_of(&self, instance: u32) -> Option<Bounds> {
-        if let Location::InArray { array, place, part } = self.numbering.locate(instance)
-            && !is_invertible(&self.arrays[array].world_from_object(place, part))
-        {
-            return None;
+    /// Where an instance is in render space; `None` where it has no extent or its place is singular.
+    fn extent_of(&self, instance: u32) -> Option<Extent> {
+        let shape = self.shape(instance);
+        let still = |frame: &Frame| {
+            Some(Extent {
+                bounds: Placed { shape, frame, time: 0.0 }.bounds()?,
+                condition: frame.condition(),
+                farthest: frame.translation.abs().max_element(),
+            })
+        };
+        match self.numbering.locate(instance) {
+            Location::Single(i) => match &self.singles[i].1 {
+                Standing::Still(frame) => still(frame),
+                Standing::Moving(pose) => {
+                    let hull = pose.times().iter().map(|&t| pose.limit(t));
+                    self.moving_extent(shape, pose.times(), |t| pose.at(t), hull)
+                }
+            },
+            Location::InArray { array: index, place, part } => {
+                let array = &self.arrays[index];
+                if !self.is_array_moving[index] {
+                    let transform = array.world_from_object(place, part, 0.0);
+                    return is_invertible(&transform)
+                        .then(|| Frame::new(&transform, self.origin))
+                        .as_ref()
+                        .and_then(still);
+                }
+                let times = array.times(part);
+                let spans = times.first().map(|&t| [t, t]).into_iter().chain(times.windows(2).map(|w| [w[0], w[1]]));
+                let hull = spans.flat_map(|span| array.corners(place, part, span));
+                self.moving_extent(shape, &times, |t| array.world_from_object(place, part, t), hull)
+            }
         }
-        self.with(instance, |placed| placed.bounds())
+    }
+
+    /// Where something is that runs through `at`, bends at `times`, and stays within the convex hull of `hull`, or is where
+    /// it is at time 0. `None` if it is flat at all times that are looked at.
+    fn moving_extent(
+        &self,
+        shape: &Shape,
+        times: &[f64],
+        at: impl Fn(f64) -> DAffine3,
+        hull: impl Iterator<Item = DAffine3>,
+    ) -> Option<Extent> {
+        let quarters = times.windows(2).flat_map(|w| [0.25, 0.5, 0.75].map(|s| w[0] + s * (w[1] - w[0])));
+        let seen = times.iter().copied().chain(quarters).chain([0.0]);
+        let condition = seen
+            .map(&at)
+            .filter(is_invertible)
+            .map(|transform| Frame::new(&transform, self.origin).condition())
+            .reduce(f64::max)?
+            * UNSEEN_CONDITION;
+        let mut extent: Option<Extent> = None;
+        for mut transform in hull.chain([at(0.0)]) {
+            // What is between two places is rounded where it is in the world.
+            let rounding = 8.0 * UNIT_ROUNDOFF * transform.translation.abs();
+            transform.translation -= self.origin;
+            let Bounds { min, max } = bounds_under(&transform, shape, condition)?;
+            let bounds = Bounds { min: min - rounding, max: max + rounding };
+            let farthest = transform.translation.abs().max_element();
+            extent = Some(extent.map_or(Extent { bounds, condition, farthest }, |all| Extent {
+                bounds: all.bounds.union(&bounds),
+                condition,
+                farthest: all.farthest.max(farthest),
+            }));
+        }
+        extent
+    }
+
+    /// Bounds of an instance in render space at all times; `None` where it has no extent.
+    fn bounds_of(&self, instance: u32) -> Option<Bounds> {
+        Some(self.extent_of(instance)?.bounds)
+    }
+
+    fn is_instance_moving(&self, instance: u32) -> bool {
+        match self.numbering.locate(instance) {
+            Location::Single(i) => matches!(self.singles[i].1, Standing::Moving(_)),
+            Location::InArray { array, .. } => self.is_array_moving[array],
+        }
+    }
+
+    /// |L||v| + |t| at the surfaces that a ray stands on: the largest.
+    fn reach(&self, ray: &Ray, departures: &Departures) -> f64 {
+        let reach = |c: &Crossing| self.with(c.instance, ray.time, |placed| placed.reach(c.primitive));
+        departures.crossings().iter().filter_map(reach).fold(0.0, f64::max)
     }
 
     /// The nearest surface that the ray meets; equal distances are decided by (instance, primitive).
@@ -116,18 +236,16 @@ impl Aggregate {
         if departures.is_none() {
             self.tree.walk(ray.origin, ray.direction, 0.0, f64::INFINITY, self.spread, |i, _| {
                 let instance = self.instance(i);
-                self.with(instance, |placed| placed.intersect(ray, instance, None, &mut nearest));
+                self.with(instance, ray.time, |placed| placed.intersect(ray, instance, None, &mut nearest));
                 nearest.limit
             });
         } else {
-            let reach =
-                departures.crossings().iter().map(|c| self.with(c.instance, |placed| placed.reach(c.primitive)));
-            let magnitude = ray.origin.abs().max_element() + reach.fold(0.0, f64::max);
+            let magnitude = ray.origin.abs().max_element() + self.reach(ray, departures);
             let from = -behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest));
             self.tree.walk(ray.origin, ray.direction, from, f64::INFINITY, self.spread, |i, _| {
                 let instance = self.instance(i);
                 let standing = Some((departures, magnitude));
-                self.with(instance, |placed| placed.intersect(ray, instance, standing, &mut nearest));
+                self.with(instance, ray.time, |placed| placed.intersect(ray, instance, standing, &mut nearest));
                 nearest.limit
             });
         }
@@ -137,15 +255,14 @@ impl Aggregate {
     /// A surface of an instance that `is_member`, which passes through the start of the ray, within rounding, and which the
     /// ray has not crossed there. Casts no further than that.
     pub fn coincident(&self, ray: &Ray, departures: &Departures, is_member: impl Fn(u32) -> bool) -> Option<Hit> {
-        let reach = departures.crossings().iter().map(|c| self.with(c.instance, |placed| placed.reach(c.primitive)));
-        let magnitude = ray.origin.abs().max_element() + reach.fold(0.0, f64::max);
+        let magnitude = ray.origin.abs().max_element() + self.reach(ray, departures);
         let about = behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest));
         let mut nearest = Nearest { hit: None, limit: about };
         self.tree.walk(ray.origin, ray.direction, -about, about, self.spread, |i, _| {
             let instance = self.instance(i);
             if is_member(instance) {
                 let standing = Some((departures, magnitude));
-                self.with(instance, |placed| placed.intersect(ray, instance, standing, &mut nearest));
+                self.with(instance, ray.time, |placed| placed.intersect(ray, instance, standing, &mut nearest));
             }
             nearest.limit
         });
@@ -159,14 +276,14 @@ impl Aggregate {
     pub fn crossings(&self, ray: &Ray, f: &mut dyn FnMut(&Hit)) {
         self.tree.walk(ray.origin, ray.direction, 0.0, f64::INFINITY, self.spread, |i, limit| {
             let instance = self.instance(i);
-            self.with(instance, |placed| placed.crossings(ray, instance, f));
+            self.with(instance, ray.time, |placed| placed.crossings(ray, instance, f));
             limit
         });
     }
 
     /// The hit point, on the surface to rounding, and the surface around it.
     pub fn local_surface(&self, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
-        self.with(hit.instance, |placed| placed.local_surface(ray, hit))
+        self.with(hit.instance, ray.time, |placed| placed.local_surface(ray, hit)).expect("it was met at this time")
     }
 
     /// Texture coordinates at a hit; `None` where none are authored (always, for analytic shapes). `_point`, the refined hit
@@ -175,6 +292,14 @@ impl Aggregate {
         match self.shape(hit.instance) {
             Shape::Sphere(_) | Shape::Solid(_) => None,
             Shape::Mesh(mesh) => mesh.uv(hit.primitive, hit.barycentric),
+        }
+    }
+
+    /// The primvar with a number at a hit; `None` where the shape has none (always, for analytic shapes).
+    pub fn primvar(&self, hit: &Hit, number: usize) -> Option<[f32; 4]> {
+        match self.shape(hit.instance) {
+            Shape::Sphere(_) | Shape::Solid(_) => None,
+            Shape::Mesh(mesh) => mesh.primvar(number, hit.primitive, hit.barycentric),
         }
     }
 
@@ -211,7 +336,21 @@ impl Aggregate {
                     let margin = margin(bounds.reach().max(other.reach()));
                     bounds.min.cmple(other.max + margin).all() && other.min.cmple(bounds.max + margin).all()
                 })
-                && self.with(other, |placed| placed.may_meet(&search))
+                && (self.is_instance_moving(other)
+                    || self.with(other, 0.0, |placed| placed.may_meet(&search)) == Some(true))
+        })
+    }
+
+    /// Whether the box about `points`, which is passed in time if it is a `path`, meets that of where an instance that
+    /// `is_member` is at any time, and one of them moves or deforms.
+    pub fn any_about(&self, points: &[DVec3], is_path: bool, is_member: impl Fn(u32) -> bool) -> bool {
+        let all = points.iter().fold(Bounds::EMPTY, |all, &p| all.union(&Bounds { min: p, max: p }));
+        self.tree.any_meeting(&all, |i| {
+            let instance = self.instance(i);
+            let moves = is_path
+                || self.is_instance_moving(instance)
+                || matches!(self.shape(instance), Shape::Mesh(mesh) if mesh.is_deforming());
+            moves && is_member(instance)
         })
     }
 
@@ -220,13 +359,13 @@ impl Aggregate {
     pub fn intersect_without_tree(&self, ray: &Ray) -> Option<Hit> {
         let mut nearest = Nearest { hit: None, limit: f64::INFINITY };
         for instance in (0..self.numbering.len()).filter(|&i| self.bounds_of(i).is_some()) {
-            self.with(instance, |placed| {
+            self.with(instance, ray.time, |placed| {
                 let object = placed.ray(ray);
                 match placed.shape {
                     Shape::Sphere(_) | Shape::Solid(_) => placed.intersect(ray, instance, None, &mut nearest),
                     Shape::Mesh(mesh) => {
                         let mut sides = Sides::new(f64::INFINITY);
-                        mesh.every_crossing(object.origin, object.direction, |hit| {
+                        mesh.every_crossing(object.origin, object.direction, ray.time, |hit| {
                             sides.offer(object.hit(instance, &hit));
                         });
                         if let Some(hit) = sides.first(mesh, ray) {
@@ -291,7 +430,7 @@ impl Sides {
             return Some(first);
         }
         // After the first the ray is on its outward side if it left there.
-        let corners = |hit: &Hit| mesh.corners(hit.primitive);
+        let corners = |hit: &Hit| mesh.corners(hit.primitive, ray.time);
         match relation(corners(&second), corners(&first), first.leaving) {
             Relation::Behind => Some(Hit { distance: first.distance, ..second }),
             _ => Some(first),
@@ -337,9 +476,14 @@ impl Placed<'_> {
         match self.shape {
             Shape::Mesh(mesh) => {
                 let mut sides = Sides::new(nearest.limit);
-                mesh.walk(object.origin, object.direction, start.as_ref(), sides.limit * object.stretch, |hit| {
-                    sides.offer(object.hit(instance, &hit)) * object.stretch
-                });
+                mesh.walk(
+                    object.origin,
+                    object.direction,
+                    ray.time,
+                    start.as_ref(),
+                    sides.limit * object.stretch,
+                    |hit| sides.offer(object.hit(instance, &hit)) * object.stretch,
+                );
                 if let Some(hit) = sides.first(mesh, ray) {
                     nearest.offer(hit);
                 }
@@ -376,7 +520,7 @@ impl Placed<'_> {
     fn crossings(&self, ray: &Ray, instance: u32, f: &mut dyn FnMut(&Hit)) {
         let object = self.ray(ray);
         match self.shape {
-            Shape::Mesh(mesh) => mesh.walk(object.origin, object.direction, None, f64::INFINITY, |hit| {
+            Shape::Mesh(mesh) => mesh.walk(object.origin, object.direction, ray.time, None, f64::INFINITY, |hit| {
                 f(&object.hit(instance, &hit));
                 f64::INFINITY
             }),

@@ -41,7 +41,7 @@ pub(crate) struct Crossing {
 ///     let (point, surface) = aggregate.local_surface(&ray, &hit);
 ///     let direction = event(&ray); // refracted, reflected or straight on
 ///     departures.depart(&ray, &hit, direction.dot(surface.n_g) > 0.0);
-///     ray = Ray { origin: point, direction };
+///     ray = Ray { origin: point, direction, ..ray };
 /// }
 /// # }
 /// ```

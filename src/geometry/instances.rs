@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use super::motion::{PlaceSamples, Pose, merged};
 use super::{Buffer, Shape};
 
 /// A shape, placed.
@@ -18,7 +19,7 @@ pub struct Instance {
     /// What is placed; shared by all its instances.
     pub shape: Arc<Shape>,
     /// Its place in the stage's world.
-    pub world_from_object: DAffine3,
+    pub world_from_object: Pose,
 }
 
 /// A shape within what an array places.
@@ -27,7 +28,7 @@ pub struct Part {
     /// What is placed; shared by all its instances.
     pub shape: Arc<Shape>,
     /// Its place within that which the array places.
-    pub place_from_object: DAffine3,
+    pub place_from_object: Pose,
 }
 
 /// Shapes placed by an array of transforms: every part at every place. Cloning shares.
@@ -37,19 +38,61 @@ pub struct InstanceArray {
     pub parts: Arc<[Part]>,
     /// Array space from each place: the rows of USD's matrices without their last column, translation last.
     pub places: Buffer<[f64; 12]>,
+    /// Where the places are at other times; always there if absent.
+    pub motion: Option<PlaceSamples>,
     /// The stage's world from the array's space.
-    pub world_from_array: DAffine3,
+    pub world_from_array: Pose,
 }
 
 impl InstanceArray {
-    /// The stage's world from the place `place`.
-    pub fn world_from_place(&self, place: usize) -> DAffine3 {
-        self.world_from_array * affine(&self.places[place])
+    /// The stage's world from the object space of `part` at `place`, at a time.
+    pub fn world_from_object(&self, place: usize, part: usize, time: f64) -> DAffine3 {
+        let part = &self.parts[part].place_from_object;
+        match &self.motion {
+            Some(motion) if time != 0.0 => self.world_from_array.at(time) * motion.at(place, time) * part.at(time),
+            _ => self.world_from_array.at(time) * affine(&self.places[place]) * part.at(time),
+        }
     }
 
-    /// The stage's world from the object space of `part` at `place`.
-    pub fn world_from_object(&self, place: usize, part: usize) -> DAffine3 {
-        self.world_from_place(place) * self.parts[part].place_from_object
+    /// Whether anything of it moves.
+    pub fn is_moving(&self) -> bool {
+        self.motion.is_some()
+            || self.world_from_array.is_moving()
+            || self.parts.iter().any(|p| p.place_from_object.is_moving())
+    }
+
+    /// The times at which the motion of a part may bend.
+    pub(super) fn times(&self, part: usize) -> Vec<f64> {
+        let places = self.motion.as_ref().map_or(&[][..], |motion| &motion.times);
+        merged([places, self.world_from_array.times(), self.parts[part].place_from_object.times()])
+    }
+
+    /// Where a part is from one time to another between which no motion bends: it stays within the hull of these. A place is
+    /// a product of up to three transforms, each linear in time, so linear in each of three times: all their ends together
+    /// are the corners of that.
+    pub(super) fn corners(&self, place: usize, part: usize, [from, to]: [f64; 2]) -> impl Iterator<Item = DAffine3> {
+        let part = &self.parts[part].place_from_object;
+        let moves = [self.world_from_array.is_moving(), self.motion.is_some(), part.is_moving()];
+        (0..8usize).filter(move |ends| (0..3).all(|level| moves[level] || ends >> level & 1 == 0)).map(move |ends| {
+            let at = |level: usize| if ends >> level & 1 == 0 { from } else { to };
+            let place = match &self.motion {
+                Some(motion) => motion.at(place, at(1)),
+                None => affine(&self.places[place]),
+            };
+            self.world_from_array.limit(at(0)) * place * part.limit(at(2))
+        })
+    }
+
+    /// The same without motion.
+    pub(crate) fn held(&self) -> Self {
+        let hold =
+            |part: &Part| Part { shape: Arc::clone(&part.shape), place_from_object: part.place_from_object.held() };
+        let parts = if self.parts.iter().any(|p| p.place_from_object.is_moving()) {
+            self.parts.iter().map(hold).collect()
+        } else {
+            Arc::clone(&self.parts)
+        };
+        Self { parts, places: self.places.clone(), motion: None, world_from_array: self.world_from_array.held() }
     }
 
     /// How many instances these are.

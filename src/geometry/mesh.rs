@@ -4,11 +4,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Buffer;
-use super::polygons::{Interpolation, PolygonMesh, PrimvarView};
+use super::motion::{Between, Deformation, Deformed};
+use super::polygons::{Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
 use super::start::{Start, behind};
 use super::topology;
 use super::tree::{Bounds, Tree};
-use super::triangle::{ShearedRay, TriangleHit};
+use super::triangle::{Corner, ShearedRay, TriangleHit};
 use crate::Result;
 
 /// A triangle whose area is below this share of its longest edge squared is a line to the digits of its points.
@@ -20,11 +21,16 @@ const FLAT: f64 = 16.0 / 16_777_216.0;
 #[derive(Debug)]
 pub struct Mesh {
     points: Buffer<[f32; 3]>,
+    /// Where the points are at other times.
+    deformation: Option<Deformation>,
     /// Points of each triangle, counter-clockwise seen from outside.
     triangles: Vec<[u32; 3]>,
     normals: Option<CornerValues>,
     normals_reversed: bool,
     uv: Option<CornerValues>,
+    uv_number: Option<usize>,
+    /// By the number that they are looked up by, with the floats in a value.
+    primvars: Vec<Option<(usize, CornerValues)>>,
     slots: Option<Vec<u16>>,
     tree: Tree,
     bounds: Bounds,
@@ -61,11 +67,28 @@ struct CornerValues {
 
 impl CornerValues {
     fn at<const N: usize>(&self, triangle: [u32; 3], primitive: u32) -> [[f32; N]; 3] {
-        let indices = self.indices.as_ref().map_or(triangle, |indices| indices[primitive as usize]);
-        indices.map(|i| {
+        self.among(&self.values, triangle, primitive)
+    }
+
+    /// The same of other values in the same order.
+    fn among<const N: usize>(&self, values: &[f32], triangle: [u32; 3], primitive: u32) -> [[f32; N]; 3] {
+        self.corners(triangle, primitive).map(|i| {
             let first = i as usize * N;
-            std::array::from_fn(|k| self.values[first + k])
+            std::array::from_fn(|k| values[first + k])
         })
+    }
+
+    /// Values of `columns` floats, up to four; the others are 0.
+    fn padded(&self, columns: usize, triangle: [u32; 3], primitive: u32) -> [[f32; 4]; 3] {
+        self.corners(triangle, primitive).map(|i| {
+            let mut value = [0.0; 4];
+            value[..columns].copy_from_slice(&self.values[i as usize * columns..][..columns]);
+            value
+        })
+    }
+
+    fn corners(&self, triangle: [u32; 3], primitive: u32) -> [u32; 3] {
+        self.indices.as_ref().map_or(triangle, |indices| indices[primitive as usize])
     }
 }
 
@@ -84,11 +107,22 @@ impl Mesh {
     /// Errors begin with the prim path and the attribute. What is only odd (faces of two corners, triangles without area,
     /// overlapping subsets) is left out and counted in the report.
     pub fn from_polygons(polygons: &PolygonMesh<'_>) -> Result<(Self, MeshReport)> {
+        Self::deforming(polygons, None)
+    }
+
+    /// The same with points that move as the checked `deformation` has them, which is as long as they are.
+    pub(crate) fn deforming(
+        polygons: &PolygonMesh<'_>,
+        deformation: Option<Deformation>,
+    ) -> Result<(Self, MeshReport)> {
         polygons.check()?;
         for (name, primvar, width) in [("normals", &polygons.normals, 3), ("primvars:st", &polygons.uv, 2)] {
             if let Some(primvar) = primvar {
                 polygons.check_primvar(name, primvar, width)?;
             }
+        }
+        for NamedPrimvar { name, columns, view } in polygons.primvars.iter().flatten() {
+            polygons.check_primvar(&format!("primvars:{name}"), view, *columns)?;
         }
         let mut report =
             MeshReport { short_faces: polygons.counts.iter().filter(|&&n| n < 3).count(), ..MeshReport::default() };
@@ -98,8 +132,12 @@ impl Mesh {
         let mut slots = face_slots.as_ref().map(|_| Vec::new());
         let mut normals = polygons.normals.as_ref().map(Collector::new);
         let mut uv = polygons.uv.as_ref().map(Collector::new);
+        let mut primvars: Vec<_> =
+            polygons.primvars.iter().map(|named| Some(Collector::new(&named.as_ref()?.view))).collect();
         polygons.triangulate(|face, corners| {
-            if is_sliver(corners.map(|corner| polygons.point(corner))) {
+            let moved = deformation.iter().flat_map(|d| &d.points);
+            let points = moved.map(|points| corners.map(|corner| widen(points[polygons.indices[corner] as usize])));
+            if is_sliver(corners.map(|corner| polygons.point(corner))) && points.into_iter().all(is_sliver) {
                 report.degenerate += 1;
                 return;
             }
@@ -107,7 +145,7 @@ impl Mesh {
             if let (Some(slots), Some(face_slots)) = (&mut slots, &face_slots) {
                 slots.push(face_slots[face]);
             }
-            for values in [&mut normals, &mut uv].into_iter().flatten() {
+            for values in [&mut normals, &mut uv].into_iter().chain(&mut primvars).flatten() {
                 values.push(face, corners, polygons.indices);
             }
         });
@@ -118,15 +156,24 @@ impl Mesh {
         report.is_closed = imbalance == topology::Imbalance::default() && !triangles.is_empty();
 
         let points = polygons.points.clone();
-        let bounds_of = |i: usize| bounds_of(triangles[i].map(|p| points[p as usize]));
+        let bounds_of = |i: usize| {
+            let at = |points: &[[f32; 3]]| bounds_of(triangles[i].map(|p| points[p as usize]));
+            let moved = deformation.iter().flat_map(|d| &d.points);
+            moved.fold(at(&points), |all, points| all.union(&at(points)))
+        };
         let tree = Tree::build(triangles.len(), bounds_of);
         let bounds = (0..triangles.len()).into_par_iter().map(bounds_of).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
         let mut mesh = Self {
             points,
+            deformation,
             triangles,
             normals: normals.map(Collector::finish),
             normals_reversed: false,
             uv: uv.map(Collector::finish),
+            uv_number: polygons.uv_number,
+            primvars: (polygons.primvars.iter().zip(primvars))
+                .map(|(named, values)| Some((named.as_ref()?.columns, values?.finish())))
+                .collect(),
             slots,
             tree,
             bounds,
@@ -166,8 +213,21 @@ impl Mesh {
         (!self.is_empty()).then_some([self.bounds.min, self.bounds.max])
     }
 
-    pub(super) fn corners(&self, primitive: u32) -> [DVec3; 3] {
-        self.corners_f32(primitive).map(widen)
+    /// Whether points move.
+    pub fn is_deforming(&self) -> bool {
+        self.deformation.is_some()
+    }
+
+    /// The moved points at a time; `None` where the mesh has its own.
+    fn deformed(&self, time: f64) -> Option<Deformed<'_>> {
+        if time == 0.0 { None } else { self.deformation.as_ref().map(|deformation| deformation.at(time)) }
+    }
+
+    pub(crate) fn corners(&self, primitive: u32, time: f64) -> [DVec3; 3] {
+        match self.deformed(time) {
+            None => self.corners_f32(primitive).map(widen),
+            Some(deformed) => self.triangles[primitive as usize].map(|p| deformed.point(p).into()),
+        }
     }
 
     /// Texture coordinates at a point of a triangle.
@@ -179,11 +239,34 @@ impl Mesh {
         }))
     }
 
+    /// The value at a point of a triangle of the primvar with a number, missing components 0; `None` if there is none.
+    pub(super) fn primvar(&self, number: usize, primitive: u32, barycentric: [f64; 2]) -> Option<[f32; 4]> {
+        let (columns, values) = match self.uv_number == Some(number) {
+            true => (2, self.uv.as_ref()?),
+            false => self.primvars.get(number)?.as_ref().map(|(columns, values)| (*columns, values))?,
+        };
+        let [a, b, c] = values.padded(columns, self.triangles[primitive as usize], primitive);
+        Some(std::array::from_fn(|k| {
+            let [a, b, c] = [a[k], b[k], c[k]].map(f64::from);
+            (a + barycentric[0] * (b - a) + barycentric[1] * (c - a)) as f32
+        }))
+    }
+
     /// Authored normals at the corners of a triangle, on the side of the faces.
-    pub(super) fn normals(&self, primitive: u32) -> Option<[DVec3; 3]> {
-        let normals = self.normals.as_ref()?.at::<3>(self.triangles[primitive as usize], primitive);
+    pub(super) fn normals(&self, primitive: u32, time: f64) -> Option<[DVec3; 3]> {
+        let authored = self.normals.as_ref()?;
+        let triangle = self.triangles[primitive as usize];
+        let normals = match &self.deformation {
+            Some(Deformation { times, normals: Some(samples), .. }) if time != 0.0 => {
+                let between = Between::find(times, time);
+                let [a, b] =
+                    [between.first, between.second].map(|i| authored.among::<3>(&samples[i], triangle, primitive));
+                std::array::from_fn(|corner| between.mix_points(widen(a[corner]), widen(b[corner])))
+            }
+            _ => authored.at::<3>(triangle, primitive).map(widen),
+        };
         let sign = if self.normals_reversed { -1.0 } else { 1.0 };
-        Some(normals.map(|n| widen(n) * sign))
+        Some(normals.map(|n| n * sign))
     }
 
     /// Whether the box of any triangle meets `search`, in object space.
@@ -197,21 +280,40 @@ impl Mesh {
         &self,
         origin: DVec3,
         direction: DVec3,
+        time: f64,
         start: Option<&Start<'_>>,
         limit: f64,
+        found: impl FnMut(MeshHit) -> f64,
+    ) {
+        let from = (origin, direction, time);
+        match self.deformed(time) {
+            None => {
+                let points = self.points.as_slice();
+                self.walk_points(from, start, limit, |p| &points[p as usize], found);
+            }
+            Some(deformed) => self.walk_points(from, start, limit, |p| deformed.point(p), found),
+        }
+    }
+
+    #[inline(always)]
+    fn walk_points<C: Corner>(
+        &self,
+        (origin, direction, time): (DVec3, DVec3, f64),
+        start: Option<&Start<'_>>,
+        limit: f64,
+        point: impl Fn(u32) -> C,
         mut found: impl FnMut(MeshHit) -> f64,
     ) {
         let sheared = ShearedRay::new(origin, direction);
-        let points = self.points.as_slice();
         let from = start.map_or(0.0, |start| -behind(start.magnitude));
         self.tree.walk(origin, direction, from, limit, 1.0, |primitive, limit| {
-            let corners = self.triangles[primitive as usize].map(|p| &points[p as usize]);
+            let corners = self.triangles[primitive as usize].map(&point);
             let Some(hit) = sheared.intersect(corners) else { return limit };
             let (distance, at_start) = match start {
                 None if hit.distance > 0.0 => (hit.distance, false),
                 None => return limit,
                 Some(start) => {
-                    let relative = |primitive| self.corners(primitive).map(|p| p - origin);
+                    let relative = |primitive| self.corners(primitive, time).map(|p| p - origin);
                     match start.triangle(primitive, &hit, direction, relative(primitive), relative) {
                         Some(met) => (met.distance, met.at_start),
                         None => return limit,
@@ -224,11 +326,11 @@ impl Mesh {
     }
 
     /// Calls `found` with every crossing at a distance > 0, asking every triangle.
-    pub(super) fn every_crossing(&self, origin: DVec3, direction: DVec3, mut found: impl FnMut(MeshHit)) {
+    pub(super) fn every_crossing(&self, origin: DVec3, direction: DVec3, time: f64, mut found: impl FnMut(MeshHit)) {
         let sheared = ShearedRay::new(origin, direction);
         for primitive in 0..self.triangles.len() as u32 {
             if let Some(TriangleHit { distance, barycentric, leaving }) =
-                sheared.intersect(self.corners_f32(primitive).each_ref())
+                sheared.intersect(self.corners(primitive, time).map(|p| p.to_array()))
                 && distance > 0.0
             {
                 found(MeshHit { primitive, distance, barycentric, leaving, at_start: false });
@@ -249,15 +351,17 @@ impl Mesh {
         let (flat, against) = (0..self.triangles.len() as u32)
             .into_par_iter()
             .map(|primitive| {
-                let [a, b, c] = self.corners(primitive);
+                let [a, b, c] = self.corners(primitive, 0.0);
                 let n_g = (b - a).cross(c - a).normalize();
-                let normals = self.normals(primitive).expect("there are normals");
+                let normals = self.normals(primitive, 0.0).expect("there are normals");
                 let flat = normals.iter().all(|n| (n.normalize_or_zero() - n_g).length() <= FLAT);
                 let against = normals.iter().sum::<DVec3>().dot(n_g) < 0.0;
                 (flat, usize::from(against))
             })
             .reduce(|| (true, 0), |x, y| (x.0 && y.0, x.1 + y.1));
-        if flat {
+        // Normals that move say something as soon as the mesh bends.
+        let moves = self.deformation.as_ref().is_some_and(|deformation| deformation.normals.is_some());
+        if flat && !moves {
             self.normals = None;
         }
         self.normals_reversed = against * 2 > self.triangles.len();

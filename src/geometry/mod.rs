@@ -17,6 +17,7 @@ mod cuboid;
 mod departures;
 mod instances;
 mod mesh;
+mod motion;
 mod placed;
 mod polygons;
 mod profile;
@@ -39,8 +40,9 @@ pub use departures::Departures;
 pub(crate) use instances::affine;
 pub use instances::{Instance, InstanceArray, Location, Numbering, Part};
 pub use mesh::{Mesh, MeshReport};
+pub use motion::{Deformation, PlaceSamples, Pose, Track, are_increasing};
 pub(crate) use placed::is_invertible;
-pub use polygons::{Interpolation, PolygonMesh, PrimvarView};
+pub use polygons::{Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
 pub use revolved::{Cap, Revolved};
 pub use solid::{Axis, Solid};
 pub use sphere::Sphere;
@@ -52,6 +54,8 @@ pub struct Ray {
     pub origin: DVec3,
     /// Unit vector along travel.
     pub direction: DVec3,
+    /// When it is there, frames from the scene's own: everything it meets stands where it is at this time.
+    pub time: f64,
 }
 
 /// Where a ray meets a surface.

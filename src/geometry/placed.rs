@@ -1,4 +1,4 @@
-//! An instance made ready: transforms both ways, and how large the numbers are that they round.
+//! An instance made ready at one time: transforms both ways, and how large the numbers are that they round.
 
 use std::ops::Deref;
 
@@ -18,6 +18,8 @@ const BOX_ERRORS: f64 = 32.0;
 pub(super) struct Placed<'a> {
     pub(super) shape: &'a Shape,
     pub(super) frame: &'a Frame,
+    /// When: frames from the scene's own.
+    pub(super) time: f64,
 }
 
 impl Deref for Placed<'_> {
@@ -103,21 +105,8 @@ impl Frame {
 impl Placed<'_> {
     /// Bounds in render space, outward by the rounding of the transforms; `None` for a shape without extent.
     pub(super) fn bounds(&self) -> Option<Bounds> {
-        let about =
-            |[min, max]: [DVec3; 2]| (self.point(0.5 * (min + max)), absolute(self.linear) * (0.5 * (max - min)));
-        let (center, half) = match self.shape {
-            Shape::Sphere(sphere) => {
-                // The extent of the ellipsoid L·S² along an axis is the length of that row of L.
-                let rows = self.linear.transpose();
-                let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
-                (self.translation, half * sphere.radius())
-            }
-            Shape::Solid(solid) => about(solid.bounds()),
-            Shape::Mesh(mesh) => about(mesh.bounds()?),
-        };
-        let magnitude = self.reach_of(self.extent()) * self.condition();
-        let error = DVec3::splat(BOX_ERRORS * UNIT_ROUNDOFF * magnitude);
-        Some(Bounds { min: center - half - error, max: center + half + error })
+        let transform = DAffine3 { matrix3: self.linear, translation: self.translation };
+        bounds_under(&transform, self.shape, self.condition())
     }
 
     /// Whether some of the surface may lie within `search`, in render space; a no is certain. What stands inside of a room
@@ -126,18 +115,9 @@ impl Placed<'_> {
         let Shape::Mesh(mesh) = self.shape else { return true };
         let center = self.inverse * (0.5 * (search.min + search.max) - self.translation);
         let half = absolute(self.inverse) * (0.5 * (search.max - search.min));
-        let rounded = search.reach() + self.reach_of(self.extent());
+        let rounded = search.reach() + self.reach_of(extent(self.shape));
         let half = half + DVec3::splat(BOX_ERRORS * UNIT_ROUNDOFF * self.inverse_norm * rounded * self.condition());
         mesh.may_meet(&Bounds { min: center - half, max: center + half })
-    }
-
-    /// Largest coordinate of the shape in object space.
-    fn extent(&self) -> f64 {
-        match self.shape {
-            Shape::Sphere(sphere) => sphere.radius(),
-            Shape::Solid(solid) => solid.extent(),
-            Shape::Mesh(mesh) => mesh.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element()),
-        }
     }
 
     /// |L||v| + |t| at a primitive: what rounding a point of it in render space is relative to.
@@ -145,9 +125,41 @@ impl Placed<'_> {
         let extent = match self.shape {
             Shape::Sphere(sphere) => sphere.radius(),
             Shape::Solid(solid) => solid.extent(),
-            Shape::Mesh(mesh) => mesh.corners(primitive).into_iter().map(|p| p.abs().max_element()).fold(0.0, f64::max),
+            Shape::Mesh(mesh) => {
+                let corners = mesh.corners(primitive, self.time);
+                corners.into_iter().map(|p| p.abs().max_element()).fold(0.0, f64::max)
+            }
         };
         self.reach_of(extent)
+    }
+}
+
+/// Bounds of a shape under a transform to render space whose rounding is enlarged `condition` times; outward by that.
+pub(super) fn bounds_under(transform: &DAffine3, shape: &Shape, condition: f64) -> Option<Bounds> {
+    let &DAffine3 { matrix3: linear, translation } = transform;
+    let about =
+        |[min, max]: [DVec3; 2]| (linear * (0.5 * (min + max)) + translation, absolute(linear) * (0.5 * (max - min)));
+    let (center, half) = match shape {
+        Shape::Sphere(sphere) => {
+            // The extent of the ellipsoid L·S² along an axis is the length of that row of L.
+            let rows = linear.transpose();
+            let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+            (translation, half * sphere.radius())
+        }
+        Shape::Solid(solid) => about(solid.bounds()),
+        Shape::Mesh(mesh) => about(mesh.bounds()?),
+    };
+    let magnitude = (norm(linear) * extent(shape) + translation.abs().max_element()) * condition;
+    let error = DVec3::splat(BOX_ERRORS * UNIT_ROUNDOFF * magnitude);
+    Some(Bounds { min: center - half - error, max: center + half + error })
+}
+
+/// Largest coordinate of a shape in object space.
+fn extent(shape: &Shape) -> f64 {
+    match shape {
+        Shape::Sphere(sphere) => sphere.radius(),
+        Shape::Solid(solid) => solid.extent(),
+        Shape::Mesh(mesh) => mesh.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element()),
     }
 }
 

@@ -56,6 +56,17 @@ pub struct PrimvarView<'a> {
     pub interpolation: Interpolation,
 }
 
+/// A primvar that something looks up by its name.
+#[derive(Clone, Debug)]
+pub struct NamedPrimvar<'a> {
+    /// The name without `primvars:`.
+    pub name: &'a str,
+    /// Floats in a value, 1 to 4.
+    pub columns: usize,
+    /// The values.
+    pub view: PrimvarView<'a>,
+}
+
 /// A polygon mesh, as authored and unchecked.
 #[derive(Clone, Debug)]
 pub struct PolygonMesh<'a> {
@@ -75,6 +86,10 @@ pub struct PolygonMesh<'a> {
     pub normals: Option<PrimvarView<'a>>,
     /// Texture coordinates.
     pub uv: Option<PrimvarView<'a>>,
+    /// The number by which the texture coordinates are looked up as a primvar.
+    pub uv_number: Option<usize>,
+    /// Primvars that are looked up by number; those that the mesh lacks are `None`.
+    pub primvars: Vec<Option<NamedPrimvar<'a>>>,
     /// Faces with slots of their own: prim path of the subset and face indices.
     pub subsets: &'a [(&'a str, &'a [i32])],
 }

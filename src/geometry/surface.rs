@@ -23,7 +23,7 @@ impl Placed<'_> {
 
     /// The point is the combination of corners, which lies in the plane to rounding however far the ray came.
     fn facet(&self, mesh: &Mesh, hit: &Hit) -> (DVec3, LocalSurface) {
-        let corners = mesh.corners(hit.primitive);
+        let corners = mesh.corners(hit.primitive, self.time);
         let [a, b, c] = corners.map(|p| self.point(p));
         // Edges from object space: there they are exact, while corners far from render space's zero are rounded.
         let (e1, e2) = (self.linear * (corners[1] - corners[0]), self.linear * (corners[2] - corners[0]));
@@ -32,7 +32,7 @@ impl Placed<'_> {
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let n_g = self.covector(normal).normalize();
         let flat = LocalSurface { n_g, n_s: n_g, curvature: Curvature::Plane, field: NormalField::Flat };
-        let surface = mesh.normals(hit.primitive).and_then(|normals| {
+        let surface = mesh.normals(hit.primitive, self.time).and_then(|normals| {
             let [s0, s1, s2] = normals.map(|n| self.covector(n));
             let (d1, d2) = (s1 - s0, s2 - s0);
             let vector = s0 + v * d1 + w * d2;

@@ -26,10 +26,29 @@ pub(crate) struct ShearedRay {
 
 /// An index below 3, so that nobody checks it again.
 #[derive(Clone, Copy, Debug)]
-enum Axis {
+pub(crate) enum Axis {
     X,
     Y,
     Z,
+}
+
+/// A corner as it is stored, or as it is computed where points move.
+pub(crate) trait Corner: Copy {
+    fn along(self, axis: Axis) -> f64;
+}
+
+impl Corner for &[f32; 3] {
+    #[inline(always)]
+    fn along(self, axis: Axis) -> f64 {
+        f64::from(self[axis as usize])
+    }
+}
+
+impl Corner for [f64; 3] {
+    #[inline(always)]
+    fn along(self, axis: Axis) -> f64 {
+        self[axis as usize]
+    }
 }
 
 /// A triangle that the line of the ray crosses.
@@ -65,8 +84,8 @@ impl ShearedRay {
 
     /// The corner in the sheared frame; z is the distance along the ray.
     #[inline(always)]
-    fn project(&self, p: &[f32; 3]) -> (DVec2, f64) {
-        let [x, y, z] = self.axes.map(|axis| f64::from(p[axis as usize]));
+    fn project(&self, p: impl Corner) -> (DVec2, f64) {
+        let [x, y, z] = self.axes.map(|axis| p.along(axis));
         let height = z - self.origin.z;
         let across = DVec2::new(x - self.origin.x, y - self.origin.y);
         (across - self.shear * height, height * self.per_z)
@@ -74,7 +93,7 @@ impl ShearedRay {
 
     /// The crossing of the ray's line with a triangle.
     #[inline]
-    pub(crate) fn intersect(&self, corners: [&[f32; 3]; 3]) -> Option<TriangleHit> {
+    pub(crate) fn intersect(&self, corners: [impl Corner; 3]) -> Option<TriangleHit> {
         let (a, az) = self.project(corners[0]);
         let (b, bz) = self.project(corners[1]);
         let (c, cz) = self.project(corners[2]);

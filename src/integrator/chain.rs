@@ -179,19 +179,24 @@ impl<'r> Record<'r> {
 #[derive(Debug)]
 pub struct Follower<'a> {
     view: &'a View<'a>,
-    /// The media around the camera.
-    outside: MediaStack,
+    /// The media around the camera; absent where they change with time.
+    outside: Option<MediaStack>,
 }
 
 impl<'a> Follower<'a> {
-    /// For rays that start at the origin of `view`.
+    /// For rays that start at the camera of `view`.
     pub fn new(view: &'a View<'a>) -> Self {
-        Self { view, outside: view.media_at(DVec3::ZERO) }
+        Self { view, outside: (!view.is_eye_passing_glass()).then(|| view.media_around_eye(0.0)) }
     }
 
-    /// The medium around the camera.
-    pub fn start_medium(&self, media: &Media) -> IorJet {
-        media.of(self.outside.current())
+    /// The media around the camera at a time.
+    fn outside_at(&self, time: f64) -> MediaStack {
+        self.outside.clone().unwrap_or_else(|| self.view.media_around_eye(time))
+    }
+
+    /// The medium around the camera at a time.
+    pub fn start_medium(&self, media: &Media, time: f64) -> IorJet {
+        media.of(self.outside_at(time).current())
     }
 
     /// The first surface alone: nothing is followed.
@@ -350,8 +355,8 @@ impl<'a> Walk<'a> {
     fn new(follower: &Follower<'a>, start: &RayStart) -> Self {
         Self {
             view: follower.view,
-            ray: Ray { origin: start.point, direction: start.direction },
-            media: follower.outside.clone(),
+            ray: Ray { origin: start.point, direction: start.direction, time: start.time },
+            media: follower.outside_at(start.time),
             departures: Departures::none(),
             travelled: 0.0,
             crossings: 0,
@@ -378,7 +383,7 @@ impl<'a> Walk<'a> {
         if !met.hit.leaving || !self.view.is_in_contact(&met.hit) || !bounds_glass(&met.hit, met.material_id) {
             return met;
         }
-        let ahead = Ray { origin: met.point, direction: self.ray.direction };
+        let ahead = Ray { origin: met.point, ..self.ray };
         let mut departures = self.departures;
         departures.depart(&self.ray, &met.hit, true);
         for _ in 0..MAX_COINCIDENT {
@@ -408,7 +413,7 @@ impl<'a> Walk<'a> {
         if scattering.kind != ScatterKind::Refraction {
             self.departures.depart(&self.ray, &met.hit, !met.hit.leaving);
         }
-        self.ray = Ray { origin: met.point, direction: direction.normalize() };
+        self.ray = Ray { origin: met.point, direction: direction.normalize(), ..self.ray };
         self.travelled = 0.0;
     }
 
@@ -472,7 +477,7 @@ impl<'a> Walk<'a> {
         let mut cluster = Cluster { media: self.media.clone(), departures: self.departures };
         let mut is_alone = true;
         self.include(&mut cluster, &met.hit, inside, counters);
-        let ahead = Ray { origin: met.point, direction: self.ray.direction };
+        let ahead = Ray { origin: met.point, ..self.ray };
         for _ in 0..MAX_COINCIDENT {
             counters.rays += 1;
             let Some(hit) = self.view.intersect(&ahead, &cluster.departures).filter(|hit| hit.at_start) else { break };

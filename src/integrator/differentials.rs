@@ -237,7 +237,8 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
                 Output::HalfWidth => out.add(layer, scalar(sample.half_width())),
                 Output::Motion => out.add(layer, sample.visible_motion()),
                 Output::Motion2 => {
-                    let motion2 = sample.motion2(&start, follower.start_medium(media), &self.log, &mut self.counters);
+                    let motion2 =
+                        sample.motion2(&start, follower.start_medium(media, start.time), &self.log, &mut self.counters);
                     out.add(layer, motion2);
                 }
                 Output::Fetch(channel) => {

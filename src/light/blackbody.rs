@@ -6,9 +6,9 @@
 //! spectrum is [`Illuminant::Planck`](super::Illuminant::Planck). 6500 K is near white, but not white, which is D65.
 
 /// Lowest temperature, kelvin; below it counts as this.
-pub const COLDEST: f64 = 1000.0;
+const COLDEST: f64 = 1000.0;
 /// Highest temperature, kelvin; above it counts as this.
-pub const HOTTEST: f64 = 10_000.0;
+const HOTTEST: f64 = 10_000.0;
 
 /// Distance of the knots, kelvin.
 const STEP: f64 = 500.0;

@@ -41,6 +41,8 @@ pub struct RayStart {
     pub direction_xy: DVec3,
     /// ∂²d/∂y².
     pub direction_yy: DVec3,
+    /// When, frames from the scene's own; the whole chain is traced at this time.
+    pub time: f64,
 }
 
 /// d' = (K' − n' d)/n, the derivative of the unit direction; `dior` is 0 for pixel x and y.

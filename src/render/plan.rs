@@ -188,10 +188,8 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     };
     let compression = product.map(|p| settings::compression(p, &mut diagnostics)).unwrap_or_default();
     attributes.warn_of_unused(&mut diagnostics);
-    if request.strict
-        && let Some(warning) = diagnostics.warnings().first()
-    {
-        return Err(Error::scene(warning.places[0].as_str(), format!("{} (--strict)", warning.message)));
+    if request.strict {
+        refuse_warnings(&[scene.diagnostics(), &diagnostics])?;
     }
     let materials = scene.materials.iter().map(MaterialDecision::of).collect();
     Ok(Plan {
@@ -216,6 +214,18 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         materials,
         diagnostics,
     })
+}
+
+/// Under `--strict` the first warning is an error, which says how many there are.
+fn refuse_warnings(diagnostics: &[&Diagnostics]) -> Result<()> {
+    let warnings = || diagnostics.iter().flat_map(|d| d.warnings());
+    let Some(first) = warnings().next() else { return Ok(()) };
+    let others = match warnings().count() - 1 {
+        0 => String::new(),
+        others => format!(", and {others} more kinds of warning"),
+    };
+    let place = first.places.first().map_or("scene", String::as_str);
+    Err(Error::scene(place, format!("{} (--strict{others})", first.message)))
 }
 
 /// The first material whose index moves with wavelength under this render's scale.

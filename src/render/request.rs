@@ -34,6 +34,6 @@ pub struct Request {
     pub crop: Option<[i32; 4]>,
     /// Samples to render: begin, end, half-open; aligned as [`is_aligned`](crate::film::sum::is_aligned) says.
     pub sample_range: Option<[u32; 2]>,
-    /// Turns what would be a warning about the request into an error.
+    /// Turns any warning, of the scene or the request, into an error.
     pub strict: bool,
 }

@@ -37,7 +37,7 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
     let follower = Follower::new(&view);
     let place = Sampler::new(plan.samples.total, plan.seed)?.sample(pixel, sample);
     let start = camera.ray(&place);
-    let medium = follower.start_medium(&media);
+    let medium = follower.start_medium(&media, start.time);
     let (mut log, mut segments) = (Vec::new(), Vec::new());
     let record = Record { steps: Some(&mut log), segments: Some(&mut segments) };
     let chain: Chain<SecondOrderColumns> = follower.follow(&start, &media, record, &mut Counters::default());

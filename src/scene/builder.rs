@@ -8,17 +8,17 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::description::{self, Array, Description, Document, Element};
+use super::description::{self, Array, Description, Document, Element, Placement};
 use super::manifest::Manifest;
 use super::material::{self, Context, Material, ScalarIor};
-use super::objects::{Object, ObjectArray, Objects, PartIds};
+use super::objects::{ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
 use super::solids;
 use super::unroll::{self, Placed, Unrolled};
 use super::{Counts, Scene};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::geometry::{
-    Buffer, InstanceArray, Interpolation, Mesh, MeshReport, Part, PolygonMesh, PrimvarView, Shape, Sphere,
+    Buffer, InstanceArray, Interpolation, Mesh, MeshReport, NamedPrimvar, Part, PolygonMesh, PrimvarView, Shape, Sphere,
 };
 
 /// Checks and compiles `description`.
@@ -32,8 +32,9 @@ pub fn build(description: Description) -> Result<Scene> {
     let placed = || singles.iter().chain(prototypes.iter().flatten());
     let mut used = vec![false; document.shapes.len()];
     placed().for_each(|p| used[p.shape] = true);
-    let shapes = build_shapes(&description, &used, &mut diagnostics)?;
     let (materials, material_ids) = build_materials(document, placed(), &mut diagnostics)?;
+    let primvars = Vec::new();
+    let shapes = build_shapes(&description, &used, &primvars, &mut diagnostics)?;
 
     let mut compiler = Compiler {
         shapes: &shapes,
@@ -46,14 +47,16 @@ pub fn build(description: Description) -> Result<Scene> {
     };
     let mut objects = Vec::with_capacity(singles.len());
     for single in &singles {
-        let Some((shape, PartIds { prim_id, material_ids })) = compiler.part(single, &mut diagnostics)? else {
+        let Some((shape, PartIds { prim_id, material_ids, .. })) = compiler.part(single, &mut diagnostics)? else {
             continue;
         };
         let instance_id = match single.instance {
             None => 0,
             Some(path) => instances.id(path, 1).ok_or_else(|| too_many(path))?,
         };
-        objects.push(Object { shape, world_from_object: single.transform, prim_id, instance_id, material_ids });
+        let primvars = constants(single.placement, &primvars)?;
+        let world_from_object = single.transform.into();
+        objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars });
     }
     let prototypes = prototypes
         .iter()
@@ -61,7 +64,8 @@ pub fn build(description: Description) -> Result<Scene> {
             let (mut parts, mut ids) = (Vec::new(), Vec::new());
             for part in placed {
                 let Some((shape, part_ids)) = compiler.part(part, &mut diagnostics)? else { continue };
-                parts.push(Part { shape, place_from_object: part.transform });
+                let part_ids = PartIds { primvars: constants(part.placement, &primvars)?, ..part_ids };
+                parts.push(Part { shape, place_from_object: part.transform.into() });
                 ids.push(part_ids);
             }
             Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids)))
@@ -69,8 +73,12 @@ pub fn build(description: Description) -> Result<Scene> {
         .collect::<Result<Vec<_>>>()?;
     let arrays = arrays.into_iter().filter_map(|array| {
         let (parts, ids) = &prototypes[array.prototype];
-        let instances =
-            InstanceArray { parts: Arc::clone(parts), places: array.places, world_from_array: array.transform };
+        let instances = InstanceArray {
+            parts: Arc::clone(parts),
+            places: array.places,
+            motion: None,
+            world_from_array: array.transform.into(),
+        };
         let parts = Arc::clone(ids);
         let placed = ObjectArray { instances, parts, first_id: array.first_id, indices: array.indices };
         (!placed.instances.is_empty()).then_some(placed)
@@ -89,6 +97,25 @@ pub fn build(description: Description) -> Result<Scene> {
 
 fn too_many(path: &str) -> Error {
     Error::scene(path, "is one too many: no more than 2^32 prims or instances can be told apart")
+}
+
+/// The constant primvars of a placement by the numbers of `names`; `None` if it has none of them.
+fn constants(placement: &Placement, names: &[String]) -> Result<Option<ConstantPrimvars>> {
+    let value = |name: &String| {
+        let Some(numbers) = placement.primvars.get(name) else { return Ok(None) };
+        if numbers.is_empty() || numbers.len() > 4 || numbers.iter().any(|number| !number.is_finite()) {
+            let problem = format!("is {numbers:?}: one to four finite numbers are needed");
+            return Err(Error::scene(format!("{}.primvars:{name}", placement.path), problem));
+        }
+        let mut value = [0.0; 4];
+        value.iter_mut().zip(numbers).for_each(|(to, from)| *to = *from as f32);
+        Ok(Some(value))
+    };
+    if placement.primvars.is_empty() {
+        return Ok(None);
+    }
+    let values = names.iter().map(value).collect::<Result<Vec<_>>>()?;
+    Ok(values.iter().any(Option::is_some).then(|| values.into()))
 }
 
 /// Gives placed shapes their compiled shape and their identifiers.
@@ -128,7 +155,7 @@ impl Compiler<'_> {
             self.triangles += report.triangles;
         }
         let material_ids = self.slots.entry(list).or_insert_with_key(|list| list.as_slice().into()).clone();
-        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids })))
+        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids, primvars: None })))
     }
 }
 
@@ -159,6 +186,7 @@ struct ShapeReport {
 fn build_shapes(
     description: &Description,
     used: &[bool],
+    names: &[String],
     diagnostics: &mut Diagnostics,
 ) -> Result<Vec<Option<Compiled>>> {
     let built: Vec<_> = description
@@ -166,18 +194,27 @@ fn build_shapes(
         .shapes
         .par_iter()
         .zip(used)
-        .map(|(shape, &used)| if used { build_shape(description, shape).map(Some) } else { Ok(None) })
+        .map(|(shape, &used)| if used { build_shape(description, shape, names).map(Some) } else { Ok(None) })
         .collect();
     let mut shapes = Vec::with_capacity(built.len());
     for (shape, result) in description.document.shapes.iter().zip(built) {
-        let Some((compiled, report)) = result? else {
+        let Some(built) = result? else {
             shapes.push(None);
             continue;
         };
-        let Some(compiled) = compiled else {
-            diagnostics.warn("empty-shape", shape.path(), "a size is 0, so that nothing of it is seen: it is left out");
-            shapes.push(None);
-            continue;
+        let (compiled, report) = match built {
+            Built::Shape(compiled, report) => (compiled, report),
+            Built::Nothing => {
+                let problem = "a size is 0, so that nothing of it is seen: it is left out";
+                diagnostics.warn("empty-shape", shape.path(), problem);
+                shapes.push(None);
+                continue;
+            }
+            Built::Broken { place, problem } => {
+                diagnostics.warn("broken-shape", place, format!("{problem}; the shape is left out"));
+                shapes.push(None);
+                continue;
+            }
         };
         if let (description::Shape::Mesh(mesh), Some(report)) = (shape, &report) {
             report_mesh(mesh, report, diagnostics);
@@ -215,17 +252,35 @@ fn report_mesh(mesh: &description::Mesh, report: &MeshReport, diagnostics: &mut 
     }
 }
 
-/// The shape, `None` if there is nothing of it; meshes with their report.
-fn build_shape(
-    description: &Description,
-    shape: &description::Shape,
-) -> Result<(Option<Arc<Shape>>, Option<MeshReport>)> {
+/// What became of a shape.
+enum Built {
+    /// Meshes have a report.
+    Shape(Arc<Shape>, Option<MeshReport>),
+    /// A size is 0.
+    Nothing,
+    /// What the stage says of it is no shape. It is left out, and the rest of the picture kept.
+    Broken { place: String, problem: String },
+}
+
+/// Compiles a shape. What the stage got wrong is no error but [`Built::Broken`]; arrays that the document names and the
+/// description lacks are damage to the description itself, and an error.
+fn build_shape(description: &Description, shape: &description::Shape, names: &[String]) -> Result<Built> {
+    match compile_shape(description, shape, names)? {
+        Ok(built) => Ok(built),
+        Err(Error::Scene { place, problem }) => Ok(Built::Broken { place, problem }),
+        Err(other) => Err(other),
+    }
+}
+
+/// The outer error is the description's, the inner the stage's.
+fn compile_shape(description: &Description, shape: &description::Shape, names: &[String]) -> Result<Result<Built>> {
+    let solid = |shape: Option<Shape>| shape.map_or(Built::Nothing, |shape| Built::Shape(Arc::new(shape), None));
     match shape {
+        description::Shape::Sphere { radius: 0.0, .. } => Ok(Ok(Built::Nothing)),
         description::Shape::Sphere { path, radius } => {
-            let sphere = Sphere::new(*radius).ok_or_else(|| {
+            Ok(Sphere::new(*radius).map(|sphere| solid(Some(Shape::Sphere(sphere)))).ok_or_else(|| {
                 Error::scene(format!("{path}.radius"), format!("is {radius}: it must be positive and finite"))
-            })?;
-            Ok((Some(Arc::new(Shape::Sphere(sphere))), None))
+            }))
         }
         description::Shape::Mesh(mesh) => {
             let arrays = NamedArrays { description, place: &mesh.path };
@@ -246,12 +301,14 @@ fn build_shape(
                 left_handed: mesh.left_handed,
                 normals: mesh.normals.as_ref().map(|p| arrays.primvar(p, 3)).transpose()?,
                 uv: mesh.uv.as_ref().map(|p| arrays.primvar(p, 2)).transpose()?,
+                uv_number: names.iter().position(|name| mesh.uv_name.as_ref() == Some(name)),
+                primvars: names.iter().map(|name| arrays.named_primvar(mesh, name)).collect::<Result<_>>()?,
                 subsets: &subsets,
             };
-            let (compiled, report) = Mesh::from_polygons(&polygons)?;
-            Ok((Some(Arc::new(Shape::Mesh(compiled))), Some(report)))
+            let mesh = Mesh::from_polygons(&polygons);
+            Ok(mesh.map(|(mesh, report)| Built::Shape(Arc::new(Shape::Mesh(mesh)), Some(report))))
         }
-        solid => Ok((solids::compile(solid)?.map(|solid| Arc::new(Shape::Solid(solid))), None)),
+        other => Ok(solids::compile(other).map(|compiled| solid(compiled.map(Shape::Solid)))),
     }
 }
 
@@ -314,6 +371,18 @@ impl<'a> NamedArrays<'a> {
         bytemuck::try_cast_slice(&array.bytes).map_err(|_| {
             Error::scene(self.place, format!("array '{name}' is not aligned to its elements: write the file again"))
         })
+    }
+
+    /// The primvar `name` of a mesh, if it has it.
+    fn named_primvar(&self, mesh: &'a description::Mesh, name: &str) -> Result<Option<NamedPrimvar<'a>>> {
+        let Some((name, primvar)) = mesh.primvars.get_key_value(name) else { return Ok(None) };
+        let shape = self.description.arrays.get(&primvar.values).map_or(&[][..], |array| &array.shape);
+        let columns = if let [_, columns] = *shape { columns } else { 1 };
+        if !(1..=4).contains(&columns) {
+            let problem = format!("has {columns} numbers in a value: what materials look up has 1 to 4");
+            return Err(Error::scene(format!("{}.primvars:{name}", self.place), problem));
+        }
+        Ok(Some(NamedPrimvar { name, columns, view: self.primvar(primvar, columns)? }))
     }
 
     fn primvar(&self, primvar: &'a description::Primvar, columns: usize) -> Result<PrimvarView<'a>> {

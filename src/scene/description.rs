@@ -288,6 +288,12 @@ pub struct Mesh {
     /// Texture coordinates, f32 `[n, 2]`.
     #[serde(default)]
     pub uv: Option<Primvar>,
+    /// The name that the texture coordinates have as a primvar, without `primvars:`.
+    #[serde(default)]
+    pub uv_name: Option<String>,
+    /// Other primvars that materials look up, by name without `primvars:`: f32 `[n]` or `[n, k]` with k ≤ 4.
+    #[serde(default)]
+    pub primvars: BTreeMap<String, Primvar>,
     /// Faces with materials of their own. Faces in none have the placement's material.
     #[serde(default)]
     pub subsets: Vec<Subset>,
@@ -376,6 +382,10 @@ pub struct Placement {
     /// Materials of the mesh's subsets, in their order; shorter or `null`: the material above.
     #[serde(default)]
     pub subset_materials: Vec<Option<usize>>,
+    /// Constant primvars that materials look up, inherited ones included, where the mesh itself has none of the name: by
+    /// name without `primvars:`, one to four numbers.
+    #[serde(default)]
+    pub primvars: BTreeMap<String, Vec<f64>>,
     /// Lit and shaded from both sides; for glass the sides are decided by the normal alone.
     #[serde(default)]
     pub double_sided: bool,

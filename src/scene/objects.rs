@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 
-use crate::geometry::{Buffer, Instance, InstanceArray, Location, Numbering, Shape};
+use crate::geometry::{Buffer, Instance, InstanceArray, Location, Numbering, Pose, Shape};
 
 /// A placed shape.
 #[derive(Clone, Debug)]
@@ -12,7 +12,7 @@ pub struct Object {
     /// The shape, shared between its placements.
     pub shape: Arc<Shape>,
     /// Stage world from object space.
-    pub world_from_object: DAffine3,
+    pub world_from_object: Pose,
     /// `prim_id`: 1-based index into [`Scene::prims`](super::Scene::prims).
     pub prim_id: u32,
     /// `instance_id`: what [`Scene::instances`](super::Scene::instances) counts, 0 for none.
@@ -20,7 +20,12 @@ pub struct Object {
     /// Material per slot (slot 0: faces in no subset): `material_id`, 1-based index into
     /// [`Scene::materials`](super::Scene::materials), 0 for none.
     pub material_ids: Arc<[u32]>,
+    /// Constant primvars.
+    pub primvars: Option<ConstantPrimvars>,
 }
+
+/// Constant primvars by the number that they are looked up by.
+pub type ConstantPrimvars = Arc<[Option<[f32; 4]>]>;
 
 /// What every place of an array has of one part.
 #[derive(Clone, Debug)]
@@ -29,6 +34,8 @@ pub struct PartIds {
     pub prim_id: u32,
     /// Material per slot.
     pub material_ids: Arc<[u32]>,
+    /// Constant primvars.
+    pub primvars: Option<ConstantPrimvars>,
 }
 
 /// Shapes placed by an array of transforms.
@@ -93,9 +100,46 @@ impl Objects {
     }
 
     /// What [`Aggregate::with_arrays`](crate::geometry::Aggregate::with_arrays) takes; it numbers the same way.
-    pub(super) fn instances(&self) -> (Vec<Instance>, Vec<InstanceArray>) {
-        let single = |o: &Object| Instance { shape: Arc::clone(&o.shape), world_from_object: o.world_from_object };
-        (self.singles.iter().map(single).collect(), self.arrays.iter().map(|a| a.instances.clone()).collect())
+    /// Without motion unless it `moves`.
+    pub(super) fn instances(&self, moves: bool) -> (Vec<Instance>, Vec<InstanceArray>) {
+        let pose = |pose: &Pose| if moves { pose.clone() } else { pose.held() };
+        let single =
+            |o: &Object| Instance { shape: Arc::clone(&o.shape), world_from_object: pose(&o.world_from_object) };
+        let array = |a: &ObjectArray| if moves { a.instances.clone() } else { a.instances.held() };
+        (self.singles.iter().map(single).collect(), self.arrays.iter().map(array).collect())
+    }
+
+    /// Whether anything moves: places, or points of shapes.
+    pub fn is_moving(&self) -> bool {
+        let deforms = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.is_deforming());
+        self.singles.iter().any(|o| o.world_from_object.is_moving() || deforms(&o.shape))
+            || self
+                .arrays
+                .iter()
+                .any(|a| a.instances.is_moving() || a.instances.parts.iter().any(|p| deforms(&p.shape)))
+    }
+
+    /// Where the object `index` is at a time, and its shape.
+    pub fn placed(&self, index: u32, time: f64) -> (&Shape, DAffine3) {
+        match self.numbering.locate(index) {
+            Location::Single(i) => {
+                let object = &self.singles[i];
+                (&object.shape, object.world_from_object.at(time))
+            }
+            Location::InArray { array, place, part } => {
+                let instances = &self.arrays[array].instances;
+                (&instances.parts[part].shape, instances.world_from_object(place, part, time))
+            }
+        }
+    }
+
+    /// The constant primvar with a number of the object `index`.
+    pub fn primvar(&self, index: u32, number: usize) -> Option<[f32; 4]> {
+        let primvars = match self.numbering.locate(index) {
+            Location::Single(i) => &self.singles[i].primvars,
+            Location::InArray { array, part, .. } => &self.arrays[array].parts[part].primvars,
+        };
+        *primvars.as_ref()?.get(number)?
     }
 
     /// The identifiers of the object `index`.
@@ -108,7 +152,7 @@ impl Objects {
             Location::InArray { array, place, part } => {
                 let array = &self.arrays[array];
                 let element = array.indices.as_ref().map_or(place as u32, |indices| indices[place] as u32);
-                let PartIds { prim_id, ref material_ids } = array.parts[part];
+                let PartIds { prim_id, ref material_ids, .. } = array.parts[part];
                 ObjectIds { prim_id, instance_id: array.first_id + element, material_ids }
             }
         }

@@ -89,7 +89,7 @@ struct Named {
 /// Unrolls the groups of `description`, which are [checked](check_groups).
 pub(super) fn unroll<'a>(description: &'a Description, diagnostics: &mut Diagnostics) -> Result<Unrolled<'a>> {
     let document = &description.document;
-    let (singles, nested) = flatten(document, document.root, diagnostics)?;
+    let (singles, nested) = flatten(document, document.root, diagnostics);
     let mut unroller = Unroller {
         description,
         diagnostics,
@@ -146,7 +146,7 @@ impl<'a> Unroller<'a, '_> {
             return Ok(());
         }
         let indices = instances.indices.as_deref().map(|name| arrays.indices(name)).transpose()?;
-        let prototype = self.prototype(instances.group)?;
+        let prototype = self.prototype(instances.group);
         let named = self.name(open.around, key, instances, places.len(), indices.as_deref())?;
         let elements = instances.count as u64;
         let Prototype { parts, nested } = &self.prototypes[prototype];
@@ -180,14 +180,14 @@ impl<'a> Unroller<'a, '_> {
     }
 
     /// The prototype that is the group `group`.
-    fn prototype(&mut self, group: usize) -> Result<usize> {
+    fn prototype(&mut self, group: usize) -> usize {
         if let Some(&prototype) = self.by_group.get(&group) {
-            return Ok(prototype);
+            return prototype;
         }
-        let (parts, nested) = flatten(&self.description.document, group, self.diagnostics)?;
+        let (parts, nested) = flatten(&self.description.document, group, self.diagnostics);
         self.prototypes.push(Prototype { parts, nested });
         self.by_group.insert(group, self.prototypes.len() - 1);
-        Ok(self.prototypes.len() - 1)
+        self.prototypes.len() - 1
     }
 
     /// Names an array within those around it. Several arrays of one instancer, one for each prototype, share identifiers.
@@ -240,7 +240,7 @@ fn flatten<'a>(
     document: &'a Document,
     group: usize,
     diagnostics: &mut Diagnostics,
-) -> Result<(Vec<Placed<'a>>, Vec<Nested<'a>>)> {
+) -> (Vec<Placed<'a>>, Vec<Nested<'a>>) {
     struct Frame<'a> {
         group: usize,
         next: usize,
@@ -253,13 +253,18 @@ fn flatten<'a>(
     while let Some(mut frame) = stack.pop() {
         let Some(item) = document.groups[frame.group].items.get(frame.next) else {
             for (i, instances) in document.groups[frame.group].instances.iter().enumerate() {
-                let local = instances.transform.map_or(Ok(DAffine3::IDENTITY), |m| from_matrix(&m, &instances.path))?;
+                let Some(local) = place_of(instances.transform.as_ref(), &instances.path, diagnostics) else {
+                    continue;
+                };
                 nested.push(Nested { key: (frame.group, i), instances, transform: frame.transform * local });
             }
             continue;
         };
         frame.next += 1;
-        let local = item.transform.map_or(Ok(DAffine3::IDENTITY), |m| from_matrix(&m, &item.path))?;
+        let Some(local) = place_of(item.transform.as_ref(), &item.path, diagnostics) else {
+            stack.push(frame);
+            continue;
+        };
         let transform = frame.transform * local;
         let instance = item.instance.as_deref().or(frame.instance);
         stack.push(frame);
@@ -273,18 +278,21 @@ fn flatten<'a>(
             Target::Shape(shape) => placed.push(Placed { shape, transform, placement: item, instance }),
         }
     }
-    Ok((placed, nested))
+    (placed, nested)
 }
 
-/// USD's row-vector matrix as an affine map of column vectors.
-fn from_matrix(matrix: &[f64; 16], place: &str) -> Result<DAffine3> {
-    if matrix.iter().any(|v| !v.is_finite()) {
-        return Err(Error::scene(place, "its transform has a value that is not finite"));
-    }
-    if [matrix[3], matrix[7], matrix[11], matrix[15] - 1.0].iter().any(|&v| v != 0.0) {
-        return Err(Error::scene(place, "its transform is projective: only affine transforms place geometry"));
-    }
-    Ok(DAffine3::from_mat4(DMat4::from_cols_array(matrix)))
+/// USD's row-vector matrix as an affine map of column vectors; `None` with a warning if it is none.
+fn place_of(matrix: Option<&[f64; 16]>, path: &str, diagnostics: &mut Diagnostics) -> Option<DAffine3> {
+    let Some(matrix) = matrix else { return Some(DAffine3::IDENTITY) };
+    let problem = if matrix.iter().any(|v| !v.is_finite()) {
+        "its transform has a value that is not finite: it is left out"
+    } else if [matrix[3], matrix[7], matrix[11], matrix[15] - 1.0].iter().any(|&v| v != 0.0) {
+        "its transform is projective, and only affine ones place geometry: it is left out"
+    } else {
+        return Some(DAffine3::from_mat4(DMat4::from_cols_array(matrix)));
+    };
+    diagnostics.warn("broken-transform", path, problem);
+    None
 }
 
 /// What a group places: items one by one, then arrays with as many places.

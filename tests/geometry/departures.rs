@@ -25,7 +25,7 @@ fn follow(
         let (point, surface) = scene.local_surface(&ray, &hit);
         let direction = event(&hit, ray.direction, surface.n_g);
         departures.depart(&ray, &hit, direction.dot(surface.n_g) > 0.0);
-        ray = Ray { origin: point, direction };
+        ray = Ray { origin: point, direction, ..ray };
     }
     hits
 }

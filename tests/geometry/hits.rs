@@ -65,7 +65,7 @@ proptest! {
                 // Towards a point of the mesh, and far away from it.
                 _ => {
                     let p = DVec3::from(points[indices[how] as usize].map(f64::from));
-                    let target = instances[0].world_from_object.transform_point3(p);
+                    let target = instances[0].world_from_object.frame().transform_point3(p);
                     let direction = if how == 1 { (target - origin).normalize_or(direction) } else { direction };
                     ray(target - direction * size * 1e3, direction)
                 }

@@ -16,6 +16,8 @@ pub(crate) fn polygons<'a>(points: &[[f32; 3]], counts: &'a [i32], indices: &'a 
         left_handed: false,
         normals: None,
         uv: None,
+        uv_number: None,
+        primvars: Vec::new(),
         subsets: &[],
     }
 }
@@ -86,7 +88,7 @@ pub(crate) fn sphere(radius: f64) -> Arc<Shape> {
 }
 
 pub(crate) fn placed(shape: &Arc<Shape>, world_from_object: DAffine3) -> Instance {
-    Instance { shape: Arc::clone(shape), world_from_object }
+    Instance { shape: Arc::clone(shape), world_from_object: world_from_object.into() }
 }
 
 pub(crate) fn at_origin(shape: &Arc<Shape>) -> Instance {
@@ -98,7 +100,7 @@ pub(crate) fn aggregate(instances: &[Instance]) -> Aggregate {
 }
 
 pub(crate) fn ray(origin: impl Into<DVec3>, direction: impl Into<DVec3>) -> Ray {
-    Ray { origin: origin.into(), direction: direction.into().normalize() }
+    Ray { origin: origin.into(), direction: direction.into().normalize(), time: 0.0 }
 }
 
 pub(crate) fn first(aggregate: &Aggregate, ray: &Ray) -> Option<Hit> {

@@ -207,7 +207,7 @@ fn follow(
         let direction = event(ray.direction, surface.n_g);
         let outward = if direction == ray.direction { hit.leaving } else { !hit.leaving };
         departures.depart(&ray, &hit, outward);
-        ray = Ray { origin: point, direction };
+        ray = Ray { origin: point, direction, ..ray };
     }
     hits
 }

@@ -50,7 +50,7 @@ fn predicted(surface: &LocalSurface, q: DVec3) -> (DVec3, f64) {
 fn check(scene: &Aggregate, r: &Ray, step: DVec3) {
     let (p, surface) = surface_at(scene, r);
     let errors = [1e-3, 1e-4].map(|h| {
-        let side = |sign: f64| surface_at(scene, &Ray { origin: r.origin + sign * h * step, direction: r.direction });
+        let side = |sign: f64| surface_at(scene, &Ray { origin: r.origin + sign * h * step, ..*r });
         let ((p1, s1), (p0, s0)) = (side(1.0), side(-1.0));
         let velocity = (p1 - p0) / (2.0 * h);
         let acceleration = (p1 - 2.0 * p + p0) / (h * h);

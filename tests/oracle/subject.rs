@@ -52,6 +52,7 @@ pub fn ray_start(start: &Start, x: f64, y: f64) -> RayStart {
         direction_xx: second(start.right, d_x, d_x, length_x, length_x),
         direction_xy: second(start.right, d_x, d_y, length_x, length_y),
         direction_yy: second(start.up, d_y, d_y, length_y, length_y),
+        time: 0.0,
     }
 }
 

@@ -334,7 +334,7 @@ def test_errors_have_one_base_and_the_usual_exceptions(slab: Slab, tmp_path: Pat
     with pytest.raises(FileNotFoundError, match=r"none\.usda"):
         abbe.render(tmp_path / "none.usda")
     with pytest.raises(abbe.StageError, match="/World/Wall"):
-        abbe.render(slab(edit=("[0, 1, 2, 3]", "[0, 1, 2, 4]")))
+        abbe.render(slab(edit=("[0, 1, 2, 3]", "[0, 1, 2, 4]")), strict=True)
     with pytest.raises(abbe.UsageError, match="--width"):
         abbe.render(slab(), width=0)
 

@@ -25,11 +25,7 @@ EXTENSIONS = (".usd", ".usda", ".usdc", ".usdz")
 SECONDS_PER_STAGE = 60
 
 # Stages that cannot be rendered, and what is said of them.
-ERRORS = {
-    "usdwg_schemaTests/test_assets/schemaTests/usdGeom/transforms/weird_matrix_transform.usda": (
-        "/World/mesh: its transform is projective"
-    ),
-}
+ERRORS: dict[str, str] = {}
 
 
 def _folder() -> Path | None:

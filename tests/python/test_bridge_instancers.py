@@ -13,7 +13,6 @@ pytest.importorskip("pxr.Usd", reason="the bridge needs usd-core")
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 import abbe
-from abbe.errors import StageError
 from abbe.usd import describe, instancers, reader
 
 STAGE = Path(__file__).parent / "stages" / "instancers.usda"
@@ -304,10 +303,26 @@ def test_an_instancer_within_its_own_prototype_is_left_out_there():
     assert places == [[0, 0, 0], [0, 0, 0], [0, 9, 0], [2, 0, 0]]
 
 
-def test_a_prototype_that_cannot_be_placed_is_an_error():
-    op = ' double3 xformOp:translate = (inf, 0, 0)\n uniform token[] xformOpOrder = ["xformOp:translate"]\n'
-    with pytest.raises(StageError, match=r"^</P/A>: its transform is not finite"):
-        describe(in_memory(INSTANCER.replace('"A"\n {\n', '"A"\n {\n' + op)))
+PROJECTIVE = "((1, 0, 0, 1), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))"
+
+
+@pytest.mark.parametrize(
+    ("op", "value", "says"),
+    [
+        ("translate", "double3 xformOp:translate = (inf, 0, 0)", "its transform is not finite"),
+        (
+            "transform",
+            "matrix4d xformOp:transform = ((1, 0, 0, 1), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))",
+            "is projective",
+        ),
+    ],
+)
+def test_a_prototype_that_cannot_be_placed_is_left_out_with_its_instances(op, value, says):
+    text = f' {value}\n uniform token[] xformOpOrder = ["xformOp:{op}"]\n'
+    description = checked(in_memory(INSTANCER.replace('"A"\n {\n', '"A"\n {\n' + text)))
+    (warning,) = warned(description, "broken-prim")
+    assert warning["places"] == ["</P/A>"] and says in warning["message"]
+    assert {path for path, *_ in unrolled(description)} == {"/P/B"}
 
 
 @pytest.mark.parametrize(("blur", "count"), [("", 1), ("uniform bool disableMotionBlur = true\n", 0)])

@@ -162,12 +162,24 @@ def test_arrays_are_usds_own_memory_and_outlive_the_stage():
     assert np.array_equal(array, np.array(points, dtype=np.float32))
 
 
-def test_a_value_that_is_not_finite_is_an_error_with_its_place():
-    with pytest.raises(StageError, match=r"^</S>\.radius = nan: "):
-        describe(in_memory('def Sphere "S"\n{\n double radius = nan\n}\n'))
-    with pytest.raises(StageError, match=r"^</S>: its transform is not finite"):
-        text = 'double3 xformOp:translate = (inf, 0, 0)\n uniform token[] xformOpOrder = ["xformOp:translate"]'
-        describe(in_memory(f'def Sphere "S"\n{{\n {text}\n}}\n'))
+@pytest.mark.parametrize(
+    ("value", "where", "says"),
+    [
+        ("double radius = nan", "</S>.radius", "is nan, which is no finite number; it is left out"),
+        ('string radius = "wide"', "</S>.radius", "is wide, which is no finite number; it is left out"),
+        (
+            'double3 xformOp:translate = (inf, 0, 0)\n uniform token[] xformOpOrder = ["xformOp:translate"]',
+            "</S>",
+            "its transform is not finite, so that it stands nowhere; it is left out",
+        ),
+    ],
+)
+def test_a_prim_with_a_value_that_is_none_is_left_out_and_named(value, where, says):
+    description = describe(in_memory(f'def Sphere "S"\n{{\n {value}\n}}\ndef Sphere "Other"\n{{\n}}\n'))
+    validate(description.document, description.arrays)
+    assert list(placements(description)) == ["/Other"]
+    (warning,) = warned(description, "broken-prim")
+    assert (warning["places"], warning["message"]) == ([where], says)
 
 
 # Visibility, purpose, types
@@ -653,7 +665,6 @@ def test_a_folder_and_other_things_are_no_stages(tmp_path):
         ("Camera", "focusDistance", "float focusDistance = inf"),
         ("Camera", "clippingRange", "float clippingRange = 1"),
         ("Camera", "clippingRange", "float2 clippingRange = (nan, 1)"),
-        ("Sphere", "radius", 'string radius = "wide"'),
         ("RenderSettings", "resolution", 'string resolution = "HD"'),
         ("RenderSettings", "dataWindowNDC", "float4 dataWindowNDC = (0, 0, inf, 1)"),
         ("RenderSettings", "includedPurposes", "int includedPurposes = 3"),

@@ -283,9 +283,13 @@ def test_bad_stages(run: Run, slab: Slab, tmp_path: Path) -> None:
         "count": ("faceVertexCounts = [4]", "faceVertexCounts = [5]"),
         "nan": ("(9, 9, -4)", "(9, nan, -4)"),
     }.items():
-        line = said(run("render", slab(f"{name}.usda", edit), "out.exr"), 1, "")
-        assert "/World/Wall" in line, line
-    assert leftovers(tmp_path) == []
+        line = said(run("render", slab(f"{name}.usda", edit), "out.exr", "--strict"), 1, "")
+        assert line.startswith("abbe: /World/Wall.") and "--strict" in line, line
+        assert leftovers(tmp_path) == []
+    # The rest of the picture is kept, and the culprit named.
+    result = run("render", slab("index.usda", ("[0, 1, 2, 3]", "[0, 1, 2, 4]")), "out.exr", "--width", "16")
+    assert result.returncode == 0
+    assert "warning: /World/Wall.faceVertexIndices: index 3 is 4, but there are 4 points" in result.stderr
 
 
 def test_an_old_file_survives_a_failed_render(run: Run, slab: Slab, tmp_path: Path) -> None:

@@ -72,6 +72,7 @@ fn pinhole(point: DVec3, look: DVec3, right: DVec3, up: DVec3, x: f64, y: f64) -
         direction_xx: second(right, d_x, right, d_x),
         direction_xy: second(right, d_x, up, d_y),
         direction_yy: second(up, d_y, up, d_y),
+        time: 0.0,
     }
 }
 

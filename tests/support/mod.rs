@@ -159,6 +159,8 @@ impl Stagehand {
             left_handed: false,
             normals: None,
             uv: None,
+            uv_name: None,
+            primvars: BTreeMap::new(),
             subsets: vec![],
         }));
         self.place(path, transform, material);

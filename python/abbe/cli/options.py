@@ -186,7 +186,7 @@ def add_request(parser: argparse.ArgumentParser) -> None:
         metavar="A:B",
         help="samples to render, half-open; `abbe merge` joins parts",
     )
-    group.add_argument("--strict", action="store_true", help="what would be warned of in the request is an error")
+    group.add_argument("--strict", action="store_true", help="any warning is an error, and nothing is written")
 
 
 def request(args: argparse.Namespace, from_stage: bool) -> Options:

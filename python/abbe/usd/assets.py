@@ -1,4 +1,4 @@
-"""Files that a stage names: images and their tiles, profiles of lights; found here, read by the core when it looks them up.
+"""Files that a stage names, images and profiles of lights: found here, read by the core when something looks them up.
 
 USD resolves asset paths: relative to the layer that names them, by the stage's resolver context, inside of packages.
 What is a file of the file system crosses as its absolute path. What is not (``scene.usdz[wood.png]``, assets of a

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Array", "ArrayTable", "Description", "Diagnostics"]
+__all__ = ["Array", "ArrayTable", "BrokenError", "Description", "Diagnostics"]
 
 Array = npt.NDArray[Any]
 """A float32, float64, int32 or uint8 array of shape (n,) or (n, k); usually USD's own memory, read-only."""
@@ -35,6 +35,18 @@ class Description:
         return warnings
 
 
+class BrokenError(Exception):
+    """What one prim says and nobody can render: that prim is left out with a warning, and the rest is rendered.
+
+    Never for what was asked for by an option or by the render settings: without that there is no picture to show.
+    """
+
+    def __init__(self, place: str, problem: str) -> None:
+        super().__init__(f"{place}: {problem}")
+        self.place = place
+        self.problem = problem
+
+
 @dataclass
 class Diagnostics:
     """Warnings by first occurrence; the same kind and message are counted together, with their first few places."""
@@ -54,6 +66,10 @@ class Diagnostics:
         warning["count"] += 1
         if len(warning["places"]) < self.EXAMPLES and place not in warning["places"]:
             warning["places"].append(place)
+
+    def leave_out(self, broken: BrokenError) -> None:
+        """Record that a prim is left out for what it says."""
+        self.warn("broken-prim", broken.place, f"{broken.problem}; it is left out")
 
     def skip(self, reason: str, count: int = 1) -> None:
         """Count prims or instances left out for ``reason``."""

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import StageError
 from . import tokens
 from ._pxr import Usd, UsdGeom
-from .description import Array, ArrayTable, Diagnostics
+from .description import Array, ArrayTable, BrokenError, Diagnostics
 from .lenses import lens_bounds, read_lens
 from .solids import read_solid, solid_bounds
 from .values import float_array, int_array, place, read
@@ -96,7 +95,7 @@ class ShapeReader:
     def _read_sphere(self, prim: Any) -> dict[str, Any] | None:
         radius = read(prim, tokens.RADIUS, self._time)
         if isinstance(radius, bool) or not isinstance(radius, (int, float)) or not math.isfinite(radius):
-            raise StageError(f"{place(prim)}.{tokens.RADIUS} = {radius}: is no finite number: give it one above 0")
+            raise BrokenError(f"{place(prim)}.{tokens.RADIUS}", f"is {radius}, which is no finite number")
         return {"sphere": {"path": str(prim.GetPath()), "radius": float(radius)}}
 
     def _read_mesh(self, prim: Any) -> dict[str, Any] | None:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..errors import StageError
 from . import tokens
 from ._pxr import UsdGeom
+from .description import BrokenError
 from .values import place, read
 
 __all__ = ["is_lens", "lens_bounds", "read_lens"]
@@ -30,7 +30,7 @@ def read_lens(prim: Any, time: Any) -> dict[str, Any]:
 
     Raises
     ------
-    StageError
+    BrokenError
         A value is no finite number.
     """
     lens: dict[str, Any] = {"path": str(prim.GetPath()), "thickness": _number(prim, tokens.LENS_THICKNESS, time)}
@@ -54,7 +54,7 @@ def _number(prim: Any, name: str, time: Any) -> float:
         # The schema's fallback.
         return 0.0
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise StageError(f"{place(prim)}.{name} = {value}: is no finite number: correct it")
+        raise BrokenError(f"{place(prim)}.{name}", f"is {value}, which is no finite number")
     return float(value)
 
 
@@ -67,7 +67,7 @@ def _numbers(prim: Any, name: str, time: Any) -> list[float]:
     except (TypeError, ValueError):
         numbers = [math.nan]
     if not all(map(math.isfinite, numbers)):
-        raise StageError(f"{place(prim)}.{name} = {value}: is no list of finite numbers: correct it")
+        raise BrokenError(f"{place(prim)}.{name}", f"is {value}, which is no list of finite numbers")
     return numbers
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from . import tokens
 from ._pxr import Usd, UsdLux, UsdShade
 from .assets import AssetReader
-from .description import Diagnostics
+from .description import BrokenError, Diagnostics
 from .materials import warn_unknown_names
 from .values import authored_namespace, place, plain, read
 
@@ -24,10 +24,6 @@ __all__ = ["LightReader", "is_light"]
 def is_light(prim: Any) -> bool:
     """Return whether a prim shines: every light of UsdLux does, and geometry with LightAPI, as MeshLightAPI brings it."""
     return bool(prim.HasAPI(UsdLux.LightAPI))
-
-
-class _Unusable(Exception):
-    """A light that cannot be; the text names the attribute and what is wrong with it."""
 
 
 class LightReader:
@@ -54,6 +50,11 @@ class LightReader:
         """Return a light without its place and its links; None with a warning where there is no such light.
 
         ``is_geometry`` says that the prim is placed as a shape too.
+
+        Raises
+        ------
+        BrokenError
+            A value of it is none.
         """
         read_shape = next((reader for schema, reader in self._shapes if prim.IsA(schema)), None)
         if is_geometry:
@@ -63,11 +64,7 @@ class LightReader:
                 "unsupported-light", place(prim), f"{_type(prim)} prims are not supported as lights; it does not shine"
             )
             return None
-        try:
-            light = self._light(prim, read_shape)
-        except _Unusable as problem:
-            self._diagnostics.warn("unusable-light", place(prim), f"{problem}: the light is left out")
-            return None
+        light = self._light(prim, read_shape)
         self._check_filters(prim)
         return light
 
@@ -219,7 +216,7 @@ class LightReader:
                 value = otherwise
             if value is None:
                 value = definition.GetAttributeFallbackValue(f"{tokens.INPUTS_PREFIX}{name}")
-            return name, value
+            return f"{tokens.INPUTS_PREFIX}{name}", value
 
         return get
 
@@ -267,28 +264,28 @@ class LightReader:
             return None
 
     def _number(self, prim: Any, name: str) -> float:
-        return self._finite(prim, name, self._value(prim, name))
+        return self._finite(prim, f"{tokens.INPUTS_PREFIX}{name}", self._value(prim, name))
 
     def _flag(self, prim: Any, name: str) -> bool:
         value = self._value(prim, name)
         if isinstance(value, (bool, int)):
             return bool(value)
-        raise _Unusable(f"{name} = {value} is neither true nor false")
+        raise BrokenError(f"{place(prim)}.{tokens.INPUTS_PREFIX}{name}", f"is {value}, neither true nor false")
 
     def _color(self, prim: Any, name: str) -> list[float]:
-        return self._three(prim, name, self._value(prim, name))
+        return self._three(prim, f"{tokens.INPUTS_PREFIX}{name}", self._value(prim, name))
 
     @staticmethod
     def _finite(prim: Any, name: str, value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise _Unusable(f"{name} = {value} is no finite number")
+            raise BrokenError(f"{place(prim)}.{name}", f"is {value}, which is no finite number")
         return float(value)
 
     @staticmethod
     def _three(prim: Any, name: str, value: Any) -> list[float]:
         numbers = plain(value)
         if not isinstance(numbers, list) or len(numbers) != 3 or not all(type(n) in (int, float) for n in numbers):
-            raise _Unusable(f"{name} = {value} is no colour of three finite numbers")
+            raise BrokenError(f"{place(prim)}.{name}", f"is {value}, which is no colour of three finite numbers")
         return [float(number) for number in numbers]
 
 

@@ -16,11 +16,11 @@ import numpy as np
 
 from ..errors import StageError, UsageError
 from . import tokens
-from ._pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+from ._pxr import Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 from .assets import AssetReader
 from .cameras import find_camera, framed_camera, read_camera
-from .composition import composition_warnings, quiet_usd
-from .description import Array, ArrayTable, Description, Diagnostics
+from .composition import composition_warnings, quiet_usd, usd_reason
+from .description import Array, ArrayTable, BrokenError, Description, Diagnostics
 from .geometry import ShapeReader
 from .instancers import InstancerReader
 from .lenses import is_lens
@@ -28,10 +28,11 @@ from .lights import LightReader, is_light
 from .links import link_lights
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
+from .places import Places
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import OpenedStage, Opening, open_stage, source_name
-from .values import IDENTITY, is_finite, matrix, place, read
+from .values import IDENTITY, is_finite, place, read
 
 __all__ = ["default_camera", "read_stage"]
 
@@ -119,8 +120,8 @@ class _Light(NamedTuple):
     """A light on its way into the description."""
 
     prim: Any
-    transform: list[float]
-    is_geometry: bool
+    transform: list[float] | None
+    """None where it is placed as a shape."""
 
 
 @dataclass
@@ -147,7 +148,7 @@ class _Walk:
         self.time = time
         self.purposes = purposes
         self.diagnostics = diagnostics
-        self.transforms = UsdGeom.XformCache(time)
+        self.places = Places(time)
         self.shapes = ShapeReader(time, diagnostics)
         self._table = ArrayTable()
         self.instancers = InstancerReader(time, diagnostics, self._table)
@@ -192,11 +193,17 @@ class _Walk:
             if kind is _Kind.INSTANCER:
                 # Its prototypes usually stand below it and are not drawn where they stand.
                 prims.PruneChildren()
-                self._instance(prim, source or prim, str(path), state, group)
-            elif kind is not _Kind.PASS_THROUGH:
-                self._visit(prim, source or prim, str(path), facts, state, group)
-            elif prim.IsModel():
-                self._check_draw_mode(prim, state)
+            try:
+                if kind is _Kind.INSTANCER:
+                    self._instance(prim, source or prim, str(path), state, group)
+                elif kind is not _Kind.PASS_THROUGH:
+                    self._visit(prim, source or prim, str(path), facts, state, group)
+                elif prim.IsModel():
+                    self._check_draw_mode(prim, state)
+            except BrokenError as broken:
+                self.diagnostics.leave_out(broken)
+            except Tf.ErrorException as error:
+                self.diagnostics.leave_out(BrokenError(place(prim), f"USD cannot read it ({usd_reason(error)})"))
 
     def _instance(self, prim: Any, source: Any, path: str, state: _State, group: _Group) -> None:
         """Add what a point instancer shows to ``group``."""
@@ -241,17 +248,17 @@ class _Walk:
         index = self._group_by_prototype.get(key)
         if index is None:
             if len(self._open) == _MAX_NESTING:
-                raise StageError(
-                    f"{place(instancer)}: is nested in {_MAX_NESTING} others: instance what they come to, or bake it"
-                )
+                raise BrokenError(place(instancer), f"is nested in {_MAX_NESTING} others, which is too deep")
             index = self._group_by_prototype[key] = len(self.groups)
             group = _Group(str(root.GetPath()), root)
             self.groups.append(group)
             self._open.append(root)
             prims = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
             depth = root.GetPath().pathElementCount - 1
-            self._traverse(prims, prims, _State(True, purpose, None), depth, group)
-            self._open.pop()
+            try:
+                self._traverse(prims, prims, _State(True, purpose, None), depth, group)
+            finally:
+                self._open.pop()
         return index
 
     def _purpose_above(self, prim: Any) -> str | None:
@@ -266,14 +273,7 @@ class _Walk:
 
     def _transform(self, prim: Any, group: _Group) -> list[float]:
         """Return the matrix from a prim's space to its group's: the world's, or the prototype root's own."""
-        if group.root is None:
-            transform = matrix(self.transforms.GetLocalToWorldTransform(prim))
-        else:
-            relative, _ = self.transforms.ComputeRelativeTransform(prim, group.root)
-            transform = matrix(relative)
-        if not is_finite(transform):
-            raise StageError(f"{place(prim)}: its transform is not finite: correct its xformOps or its parents'")
-        return transform
+        return self.places.of(prim, group.root)
 
     def _facts(self, prim: Any) -> _Facts:
         type_name = prim.GetTypeName()
@@ -320,7 +320,7 @@ class _Walk:
             self.diagnostics.skip(f"purpose {purpose}")
             return
         if facts.shines:
-            group.lights.append(_Light(prim, self._transform(prim, group), kind in _GEOMETRY))
+            group.lights.append(_Light(prim, None if kind in _GEOMETRY else self._transform(prim, group)))
         if kind is _Kind.LIGHT:
             return
         if kind is _Kind.MESH:
@@ -395,11 +395,15 @@ class _Walk:
         """Add lights to the groups, which are bound, and return the sets that they are linked to."""
         lights = []
         for group, described in zip(self.groups, groups, strict=True):
-            for prim, transform, is_geometry in group.lights:
-                light = reader.read(prim, is_geometry=is_geometry)
+            for prim, transform in group.lights:
+                try:
+                    light = reader.read(prim, is_geometry=transform is None)
+                except BrokenError as broken:
+                    self.diagnostics.leave_out(broken)
+                    continue
                 if light is None:
                     continue
-                if transform != IDENTITY:
+                if transform is not None and transform != IDENTITY:
                     light["transform"] = transform
                 described.setdefault("lights", []).append(light)
                 lights.append((light, prim))
@@ -510,7 +514,7 @@ def _read(
     def camera_index(prim: Any) -> int:
         if prim not in index_by_camera:
             index_by_camera[prim] = len(cameras)
-            cameras.append(read_camera(prim, time, walk.transforms))
+            cameras.append(read_camera(prim, time, walk.places.cache))
         return index_by_camera[prim]
 
     chosen = find_camera(stage, camera, source) if camera else default_camera(stage, settings_prim, walk.cameras)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..errors import StageError
 from . import tokens
 from ._pxr import UsdGeom
+from .description import BrokenError
 from .values import place, read
 
 __all__ = ["read_solid", "solid_bounds", "solid_kind"]
@@ -52,7 +52,7 @@ def read_solid(prim: Any, time: Any) -> dict[str, Any]:
 
     Raises
     ------
-    StageError
+    BrokenError
         A size is no finite number, or the axis is none of X, Y and Z.
     """
     name = solid_kind(prim)
@@ -63,7 +63,7 @@ def read_solid(prim: Any, time: Any) -> dict[str, Any]:
     if name != "Cube":
         axis = str(read(prim, tokens.AXIS, time))
         if axis not in tokens.AXES:
-            raise StageError(f"{place(prim)}.{tokens.AXIS} = {axis}: is no axis: choose X, Y or Z")
+            raise BrokenError(f"{place(prim)}.{tokens.AXIS}", f"is {axis}, which is no axis: X, Y or Z")
         shape["axis"] = axis
     return {_SCHEMAS[name]: shape}
 
@@ -71,7 +71,7 @@ def read_solid(prim: Any, time: Any) -> dict[str, Any]:
 def _number(prim: Any, name: str, time: Any) -> float:
     value = read(prim, name, time)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise StageError(f"{place(prim)}.{name} = {value}: is no finite number: give it one above 0")
+        raise BrokenError(f"{place(prim)}.{name}", f"is {value}, which is no finite number")
     return float(value)
 
 

@@ -28,7 +28,7 @@ What is not given, the scene's render settings decide.
   --threads N              all of the machine's unless given; never changes a bit
   --crop X0,Y0,X1,Y1       pixels to render, half-open, y down
   --sample-range A:B       samples to render, half-open; `abbe merge` joins parts
-  --strict                 what would be warned of in the request is an error
+  --strict                 any warning is an error, and nothing is written
   --mmap                   map the scene into memory; the file must not change meanwhile
   --stats FILE.json        write what was counted, chosen and warned of
   --quiet                  no progress and no warnings
