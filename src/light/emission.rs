@@ -51,7 +51,7 @@ impl Illuminant {
             return Err(format!("has {} entries: a spectrum has at least two", entries.len()));
         }
         if let Some([nm, power]) =
-            entries.iter().find(|[nm, power]| !nm.is_finite() || !(*power >= 0.0 && power.is_finite()))
+            entries.iter().find(|[nm, power]| !(nm.is_finite() && *power >= 0.0 && power.is_finite()))
         {
             return Err(format!(
                 "has the entry ({nm}, {power}): wavelengths are finite, power is finite and not negative"

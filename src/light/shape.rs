@@ -115,7 +115,7 @@ pub struct Ellipsoid {
     pub axes: DMat3,
     /// Of its surface.
     pub area: f64,
-    /// It may be taken for a point.
+    /// It is a point with the radiant intensity of this surface, radiance times projected area in each direction.
     pub is_point: bool,
 }
 
@@ -145,7 +145,7 @@ pub struct Tube {
     pub radii: [DVec3; 2],
     /// Of the side; the ends do not shine.
     pub area: f64,
-    /// It may be taken for a line.
+    /// It is a line along its axis with the radiant intensity of this surface, radiance times projected area.
     pub is_line: bool,
 }
 

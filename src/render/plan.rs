@@ -18,9 +18,9 @@ use crate::geometry::Shape;
 use crate::integrator::transmittance::absorbs;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
 use crate::optics::dispersion::Dispersion;
-use crate::scene::Scene;
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
+use crate::scene::{Scene, lights};
 use crate::spectrum::{Wavelength, lines};
 
 /// One layer to be rendered.
@@ -323,11 +323,15 @@ fn reasons(
             None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
         }
     }
-    note(
-        false,
-        "light sampling, emission, textures",
-        format!("the integrator '{}' has no use for them", integrator.name()),
-    );
+    let unused = format!("the integrator '{}' has no use for them", integrator.name());
+    let kinds: Vec<_> =
+        lights::kinds(scene.document()).into_iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+    if kinds.is_empty() {
+        note(false, "light sampling, emission, textures", unused);
+    } else {
+        note(false, &format!("lights ({})", kinds.join(", ")), unused.clone());
+        note(false, "emission, textures", unused);
+    }
     for (reason, count) in &scene.skipped {
         note(false, reason, format!("{count} left out by the bridge"));
     }

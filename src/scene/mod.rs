@@ -6,6 +6,8 @@
 pub mod builder;
 pub mod description;
 pub mod file;
+pub mod lights;
+mod links;
 mod manifest;
 pub mod material;
 mod objects;
@@ -18,6 +20,7 @@ use std::collections::BTreeMap;
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 use description::{Description, Document};
+use links::Links;
 pub use manifest::Manifest;
 use material::Material;
 pub use objects::{ConstantPrimvars, Object, ObjectArray, ObjectIds, Objects, PartIds};
@@ -27,6 +30,7 @@ pub use objects::{ConstantPrimvars, Object, ObjectArray, ObjectIds, Objects, Par
 pub struct Scene {
     /// Placed shapes in the order of the description.
     pub objects: Objects,
+    links: Links,
     /// Materials bound to some object, in the order of the description.
     pub materials: Vec<Material>,
     /// Prim paths behind `prim_id`.
@@ -60,6 +64,17 @@ impl Scene {
     /// Errors name the prim concerned; oddities that were repaired stand in [`diagnostics`](Self::diagnostics).
     pub fn build(description: Description) -> Result<Self> {
         builder::build(description)
+    }
+
+    /// The lights, compiled now: their files are read. Only integrators that use lights ask.
+    pub fn lights(&self) -> Result<lights::Lights> {
+        lights::compile(self)
+    }
+
+    /// Whether an object is in a link set: what [`Light::illuminates`](crate::light::Light::illuminates) and
+    /// [`Light::shadowed_by`](crate::light::Light::shadowed_by) refer to.
+    pub fn is_linked(&self, set: u32, object: u32) -> bool {
+        self.links.contains(set, self.objects.location(object))
     }
 
     /// What the bridge and the builder had to say.

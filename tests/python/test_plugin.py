@@ -61,6 +61,14 @@ SCHEMAS = {
             "abbe:lens:back:semiDiameter": ("double", VARYING, 0.0, None),
         },
     ),
+    "AbbeLightAPI": (
+        "DomeLight",
+        {
+            "abbe:illuminant": ("token", UNIFORM, "", ["", "D65", "A", "E", "blackbody", "table"]),
+            "abbe:spectrum:table": ("double2[]", UNIFORM, [], None),
+            "abbe:lightGroup": ("string", UNIFORM, "", None),
+        },
+    ),
     "AbbeRenderSettingsAPI": (
         "RenderSettings",
         {
@@ -99,7 +107,7 @@ if len(sys.argv) > 1:
 stage = Usd.Stage.CreateInMemory()
 registry = Usd.SchemaRegistry()
 found = {}
-for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeLensAPI", "Mesh"),
+for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeLensAPI", "Mesh"), ("AbbeLightAPI", "DomeLight"),
                      ("AbbeRenderSettingsAPI", "RenderSettings"), ("AbbeRenderVarAPI", "RenderVar")):
     definition = registry.FindAppliedAPIPrimDefinition(name)
     if definition is None:

@@ -22,7 +22,7 @@ __all__ = ["LightReader", "is_light"]
 
 
 def is_light(prim: Any) -> bool:
-    """Return whether a prim shines: every light of UsdLux does, and geometry with LightAPI, as MeshLightAPI brings it."""
+    """Return whether a prim shines: lights of UsdLux do, and geometry with LightAPI, as MeshLightAPI brings it."""
     return bool(prim.HasAPI(UsdLux.LightAPI))
 
 
@@ -127,7 +127,8 @@ class LightReader:
         return {"cylinder": {"length": length, "radius": radius, "treat_as_line": hint}}
 
     def _dome(self, prim: Any) -> dict[str, Any]:
-        pole = str(read(prim, tokens.POLE_AXIS, self._time) or tokens.Y) if prim.IsA(UsdLux.DomeLight_1) else tokens.Y
+        # The older schema says that the pole is on +Y, whatever the stage's up axis.
+        pole = str(read(prim, tokens.POLE_AXIS, self._time)) if prim.IsA(UsdLux.DomeLight_1) else "Y"
         radius = read(prim, tokens.GUIDE_RADIUS, self._time)
         return {
             "dome": {
@@ -201,7 +202,7 @@ class LightReader:
         }
 
     def _applied(self, prim: Any, schema: Any, namespace: str) -> Callable[..., tuple[str, Any]] | None:
-        """Return a function from an attribute's name to (name, value) by a schema that is applied or authored, else None."""
+        """Return a function from a name to attribute and value by a schema; None if it is not applied or authored."""
         names = (f"{tokens.INPUTS_PREFIX}{namespace}", namespace)
         is_authored = any(
             isinstance(item, Usd.Attribute) for name in names for item in prim.GetAuthoredPropertiesInNamespace(name)
@@ -231,7 +232,7 @@ class LightReader:
     # Values
 
     def _attribute(self, prim: Any, name: str) -> Any:
-        """Return the attribute of an input, under its older name where that alone is authored; None if there is none."""
+        """Return the attribute of an input, under its older name where that alone is authored; None without one."""
         attribute = prim.GetAttribute(f"{tokens.INPUTS_PREFIX}{name}")
         if attribute and (attribute.HasAuthoredValue() or attribute.HasAuthoredConnections()):
             return self._source(attribute)

@@ -1,8 +1,8 @@
 """Light and shadow linking: which placements the collections of the lights contain, in as few words as possible.
 
-Most lights link everything, and of them nothing is stored. Where one does not, its membership becomes a link set, shared
-between all collections with the same members; placements name the sets they are in (or those they are not in, where that
-is shorter), as Hydra's categories do.
+Most lights link everything, and of them nothing is stored. Where one does not, its membership becomes a link set,
+shared between all collections with the same members; placements name the sets they are in (or those they are not in,
+where that is shorter), as Hydra's categories do.
 """
 
 from __future__ import annotations
