@@ -16,6 +16,7 @@
 //! | [`ray`] | columns, transfer, scattering, footprint, chromatic motion: the calculus |
 //! | [`geometry`] | shapes, instances, trees, hits |
 //! | [`light`] | what shines: shapes, spectra, profiles |
+//! | [`texture`] | images, colour spaces, what is computed of them |
 //! | [`camera`], [`sampler`] | where rays begin |
 //! | [`scene`] | the description, its checks, the compiled scene |
 //! | [`film`] | the AOV table, layers, sums independent of grouping |
@@ -43,5 +44,6 @@ pub mod render;
 pub mod sampler;
 pub mod scene;
 pub mod spectrum;
+pub mod texture;
 
 pub use error::{Error, Result};

@@ -11,7 +11,7 @@ const LAYERS: &[&[&str]] = &[
     &["optics"],
     &["ray"],
     &["geometry"],
-    &["light"],
+    &["light", "texture"],
     &["sampler"],
     &["scene", "camera"],
     &["film"],

@@ -6,23 +6,23 @@
 //! Sources: the documentation of UsdLux (OpenUSD 26.11, `pxr/usd/usdLux/schema.usda`) and, where that is silent, the
 //! reference renderer hdEmbree; each deviation says so.
 
-mod blackbody;
 pub mod emission;
 pub mod environment;
 pub mod ies;
 mod shadow;
 mod shape;
 mod shaping;
+mod temperature;
 
 use std::f64::consts::PI;
 
-pub use blackbody::{luminance, rgb as blackbody_rgb};
-pub use emission::{Emission, Illuminant};
+pub use emission::{Emission, Spectrum};
 pub use environment::Layout;
 use glam::{DMat3, DVec3};
 pub use shadow::Shadow;
 pub use shape::{Distant, Dome, Ellipsoid, Geometry, MaterialSync, Patch, Shape, Tube};
 pub use shaping::{Shaping, ShapingProfile};
+pub use temperature::{luminance, rgb as rgb_of_temperature};
 
 /// A light.
 #[derive(Clone, Debug)]

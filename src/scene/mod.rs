@@ -10,6 +10,7 @@ pub mod lights;
 mod links;
 mod manifest;
 pub mod material;
+mod meshes;
 mod objects;
 mod solids;
 mod unroll;
@@ -23,7 +24,7 @@ use description::{Description, Document};
 use links::Links;
 pub use manifest::Manifest;
 use material::Material;
-pub use objects::{ConstantPrimvars, Object, ObjectArray, ObjectIds, Objects, PartIds};
+pub use objects::{Appearance, ConstantPrimvars, Object, ObjectArray, ObjectIds, Objects, PartIds};
 
 /// Everything that can be rendered, checked.
 #[derive(Clone, Debug)]

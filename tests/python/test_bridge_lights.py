@@ -416,23 +416,8 @@ def test_colour_temperatures_are_usds():
 
 def test_lights_come_to_what_the_formulas_say():
     lights = compiled(LIGHTS)
-    assert set(lights) == {
-        f"/World/{name}"
-        for name in [
-            "Distant",
-            "Dome",
-            "NewDome",
-            "UprightDome",
-            "Rect",
-            "Key",
-            "Spot",
-            "Point",
-            "Tube",
-            "Old",
-            "Set/Panel",
-            "Glow",
-        ]
-    }
+    names = ["Distant", "Dome", "NewDome", "UprightDome", "Rect", "Key", "Spot", "Point", "Tube", "Old", "Set/Panel"]
+    assert set(lights) == {f"/World/{name}" for name in [*names, "Glow"]}
     half = math.radians(0.5)
     assert lights["/World/Distant"]["emission"][0] == pytest.approx(50000 / (math.pi * math.sin(half) ** 2), rel=1e-12)
     stage = Usd.Stage.Open(str(LIGHTS))
@@ -442,7 +427,7 @@ def test_lights_come_to_what_the_formulas_say():
     assert rect["area"] == pytest.approx(2 * 2 * 4 * 3) and rect["emission"][0] == pytest.approx(1 / 48)
     assert rect["direction"] == [0, 0, -1] and rect["power"] == pytest.approx(math.pi)
     key = lights["/World/Key"]
-    assert key["illuminant"] == "blackbody 3200 K" and key["group"] == "key" and key["shaped"]
+    assert key["spectrum"] == "blackbody 3200 K" and key["group"] == "key" and key["shaped"]
     assert key["emission"] == pytest.approx([40, 20, 10]) and key["position"] == [0, 3, 4]
     point = lights["/World/Point"]
     assert point["kind"] == "point" and point["area"] is None and point["power"] == pytest.approx(math.pi)
@@ -468,18 +453,20 @@ def SphereLight "White" { token physical:illuminant = "white"
 def SphereLight "Ours" { token physical:illuminant = "white"
  uniform token abbe:illuminant = "table"
  uniform double2[] abbe:spectrum:table = [(500, 1), (600, 1)] }
-def SphereLight "Wrong" { uniform token abbe:illuminant = "F11" }
+def SphereLight "Wrong" { uniform token abbe:illuminant = "HP1" }
+def SphereLight "Warm" { uniform token abbe:illuminant = "D50" }
 def SphereLight "Empty" { uniform token abbe:illuminant = "table"
  uniform double2[] abbe:spectrum:table = [(500, nan), (600, 1)] }
 """)
     scene = abbe.Scene.from_stage(stage)
-    illuminants = {light["path"]: light["illuminant"] for light in scene.lights()}
+    illuminants = {light["path"]: light["spectrum"] for light in scene.lights()}
     assert illuminants == {
         "/Table": "table",
         "/Body": "blackbody 15000 K",
         "/White": "D65",
         "/Ours": "table",
         "/Wrong": "D65",
+        "/Warm": "daylight",
         "/Empty": "D65",
     }
     assert all(light["emission"] == [1, 1, 1] for light in scene.lights())

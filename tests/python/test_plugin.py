@@ -64,11 +64,17 @@ SCHEMAS = {
     "AbbeLightAPI": (
         "DomeLight",
         {
-            "abbe:illuminant": ("token", UNIFORM, "", ["", "D65", "A", "E", "blackbody", "table"]),
+            "abbe:illuminant": (
+                "token",
+                UNIFORM,
+                "",
+                ["", "D65", "D50", "D55", "D75", "A", "E", "FL2", "FL7", "FL11", "blackbody", "table"],
+            ),
             "abbe:spectrum:table": ("double2[]", UNIFORM, [], None),
             "abbe:lightGroup": ("string", UNIFORM, "", None),
         },
     ),
+    "AbbeSubdivisionAPI": ("Mesh", {"abbe:subdivision:level": ("int", UNIFORM, 2, None)}),
     "AbbeRenderSettingsAPI": (
         "RenderSettings",
         {
@@ -108,6 +114,7 @@ stage = Usd.Stage.CreateInMemory()
 registry = Usd.SchemaRegistry()
 found = {}
 for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeLensAPI", "Mesh"), ("AbbeLightAPI", "DomeLight"),
+                     ("AbbeSubdivisionAPI", "Mesh"),
                      ("AbbeRenderSettingsAPI", "RenderSettings"), ("AbbeRenderVarAPI", "RenderVar")):
     definition = registry.FindAppliedAPIPrimDefinition(name)
     if definition is None:

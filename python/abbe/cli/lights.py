@@ -39,8 +39,8 @@ def run(args: argparse.Namespace) -> int:
 def _line(light: Mapping[str, Any]) -> str:
     """Return a light on one line, without its path."""
     parts = [light["kind"], f"emission {_numbers(light['emission'])}"]
-    if light["illuminant"] != "D65":
-        parts.append(light["illuminant"])
+    if light["spectrum"] != "D65":
+        parts.append(light["spectrum"])
     for name in ("area", "power"):
         if light[name] is not None:
             parts.append(f"{name} {light[name]:.6g}")

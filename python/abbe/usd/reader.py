@@ -32,6 +32,7 @@ from .places import Places
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import OpenedStage, Opening, open_stage, source_name
+from .subdivision import refinement_level
 from .values import IDENTITY, is_finite, place, read
 
 __all__ = ["default_camera", "read_stage"]
@@ -143,19 +144,27 @@ _MAX_NESTING = 64
 class _Walk:
     """One reading of one stage at one time."""
 
-    def __init__(self, opened: OpenedStage, time: Any, purposes: frozenset[str], diagnostics: Diagnostics) -> None:
+    def __init__(
+        self,
+        opened: OpenedStage,
+        time: Any,
+        purposes: frozenset[str],
+        level: int | None,
+        diagnostics: Diagnostics,
+    ) -> None:
         self.stage = opened.stage
         self.time = time
         self.purposes = purposes
         self.diagnostics = diagnostics
         self.places = Places(time)
-        self.shapes = ShapeReader(time, diagnostics)
+        self.shapes = ShapeReader(time, diagnostics, level)
         self._table = ArrayTable()
         self.instancers = InstancerReader(time, diagnostics, self._table)
         self.groups: list[_Group] = [_Group("/")]
         self.cameras: list[Any] = []
         self._kinds: dict[str, _Kind] = {}
         self._facts_by_prim: dict[Any, _Facts] = {}
+        self._hidden: dict[tuple[Any, str], bool] = {}
         self._group_by_prototype: dict[tuple[Any, str | None], int] = {}
         # The prototypes around what is visited, innermost last.
         self._open: list[Any] = []
@@ -319,6 +328,9 @@ class _Walk:
         if purpose not in self.purposes:
             self.diagnostics.skip(f"purpose {purpose}")
             return
+        if purpose != tokens.DEFAULT and self._hides(prim, purpose):
+            self.diagnostics.skip("invisible")
+            return
         if facts.shines:
             group.lights.append(_Light(prim, None if kind in _GEOMETRY else self._transform(prim, group)))
         if kind is _Kind.LIGHT:
@@ -345,6 +357,27 @@ class _Walk:
             self.diagnostics.warn(
                 "unsupported-prim", place(prim), f"{prim.GetTypeName()} prims are not supported; they are left out"
             )
+
+    def _hides(self, prim: Any, purpose: str) -> bool:
+        """Whether the nearest authored visibility of a purpose, the prim's own or one above it, is invisible.
+
+        The fallback of guides is invisible too, but here they are shown only where somebody has asked for guides.
+        """
+        asked, is_hidden = [], False
+        while prim:
+            known = self._hidden.get((prim, purpose))
+            if known is not None:
+                is_hidden = known
+                break
+            asked.append((prim, purpose))
+            if prim.HasAPI(UsdGeom.VisibilityAPI):
+                attribute = prim.GetAttribute(purpose + tokens.PURPOSE_VISIBILITY)
+                if attribute and attribute.HasAuthoredValue():
+                    is_hidden = read(prim, attribute.GetName(), self.time) == tokens.INVISIBLE
+                    break
+            prim = prim.GetParent()
+        self._hidden.update((key, is_hidden) for key in asked)
+        return is_hidden
 
     def _check_draw_mode(self, prim: Any, state: _State) -> None:
         mode = read(prim, tokens.DRAW_MODE, self.time)
@@ -470,19 +503,23 @@ def read_stage(
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
+    complexity: str | None,
     strict: bool,
     **opening: Unpack[Opening],
 ) -> Description:
     """Read a stage into a description; the arguments are those of :func:`abbe.usd.describe`."""
     if missing not in ("warn", "error"):
         raise UsageError(f"missing '{missing}': choose 'warn' or 'error'")
+    refinement_level(complexity)  # before the stage is opened
     diagnostics = Diagnostics()
     source = source_name(stage_or_path)
     with quiet_usd(source, diagnostics):
         # A mask keeps the camera and the settings that were asked for by path.
         also = [path for path in (camera, render_settings, product) if path and path.startswith("/")]
         opened = open_stage(stage_or_path, also=also, diagnostics=diagnostics, **opening)
-        return _read(opened, diagnostics, frame, camera, render_settings, product, purposes, missing, strict)
+        return _read(
+            opened, diagnostics, frame, camera, render_settings, product, purposes, missing, complexity, strict
+        )
 
 
 def _read(
@@ -494,13 +531,14 @@ def _read(
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
+    complexity: str | None,
     strict: bool,
 ) -> Description:
     stage, source = opened.stage, opened.source
     time, time_code = stage_time(stage, frame)
     composition_warnings(opened, missing, diagnostics)
     settings_prim = find_settings(stage, render_settings, source, diagnostics)
-    walk = _Walk(opened, time, _purposes(purposes, settings_prim), diagnostics)
+    walk = _Walk(opened, time, _purposes(purposes, settings_prim), refinement_level(complexity), diagnostics)
     walk.run()
     assets = AssetReader(stage, time)
     materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim))

@@ -21,6 +21,8 @@ TIME_CODES_PER_SECOND: Final = "timeCodesPerSecond"
 VISIBILITY: Final = "visibility"
 INVISIBLE: Final = "invisible"
 PURPOSE: Final = "purpose"
+# Of VisibilityAPI, behind the name of a purpose.
+PURPOSE_VISIBILITY: Final = "Visibility"
 DEFAULT: Final = "default"
 PURPOSES: Final = ("default", "render", "proxy", "guide")
 DEFAULT_PURPOSES: Final = ("default", "render")
@@ -59,6 +61,22 @@ FACE_VERTEX_INDICES: Final = "faceVertexIndices"
 HOLE_INDICES: Final = "holeIndices"
 SUBDIVISION_SCHEME: Final = "subdivisionScheme"
 NO_SUBDIVISION: Final = "none"
+SUBDIVISION_SCHEMES: Final = ("catmullClark", "loop", "bilinear")
+# Options of a subdivision surface with what USD allows, the fallback last.
+INTERPOLATE_BOUNDARY: Final = ("interpolateBoundary", ("none", "edgeOnly", "edgeAndCorner"))
+FACE_VARYING_INTERPOLATION: Final = (
+    "faceVaryingLinearInterpolation",
+    ("none", "cornersOnly", "cornersPlus2", "boundaries", "all", "cornersPlus1"),
+)
+TRIANGLE_RULE: Final = ("triangleSubdivisionRule", ("smooth", "catmullClark"))
+CREASE_INDICES: Final = "creaseIndices"
+CREASE_LENGTHS: Final = "creaseLengths"
+CREASE_SHARPNESSES: Final = "creaseSharpnesses"
+CORNER_INDICES: Final = "cornerIndices"
+CORNER_SHARPNESSES: Final = "cornerSharpnesses"
+SUBDIVISION_LEVEL: Final = "abbe:subdivision:level"
+# usdrecord's names for refinement levels 0 to 3.
+COMPLEXITIES: Final = ("low", "medium", "high", "veryhigh")
 NORMALS: Final = "normals"
 PRIMVARS_NORMALS: Final = "primvars:normals"
 PRIMVARS: Final = "primvars"
@@ -266,6 +284,7 @@ LIGHT_NAMES: Final = {
     "abbe:spectrum:table": "double2[]",
     "abbe:lightGroup": "string",
 }
+MESH_NAMES: Final = {SUBDIVISION_LEVEL: "int"}
 SCALAR_IOR: Final = "abbe:scalarIor"
 SETTINGS_NAMES: Final = {
     "abbe:integrator": "token",
@@ -301,7 +320,7 @@ LIGHT_TYPES: Final = (
 )
 OUR_SCHEMAS: Final = {
     "Material": MATERIAL_NAMES,
-    "Mesh": {**LENS_NAMES, **LIGHT_NAMES},
+    "Mesh": {**LENS_NAMES, **MESH_NAMES, **LIGHT_NAMES},
     "Xform": LENS_NAMES,
     RENDER_SETTINGS: SETTINGS_NAMES,
     RENDER_VAR: VAR_NAMES,

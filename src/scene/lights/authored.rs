@@ -8,10 +8,11 @@ use glam::{DAffine3, DMat3, DVec3};
 use crate::diagnostics::Diagnostics;
 use crate::light::ies::Profile;
 use crate::light::{
-    Distant, Dome, Ellipsoid, Emission, Geometry, Illuminant, Layout, Light, MaterialSync, Patch, Shadow, Shape,
-    Shaping, ShapingProfile, Tube, blackbody_rgb,
+    Distant, Dome, Ellipsoid, Emission, Geometry, Layout, Light, MaterialSync, Patch, Shadow, Shape, Shaping,
+    ShapingProfile, Spectrum, Tube, rgb_of_temperature,
 };
 use crate::scene::description::{self, Authored, LightShape};
+use crate::spectrum::illuminant::Illuminant;
 
 /// Attributes of ours.
 const ILLUMINANT: &str = "abbe:illuminant";
@@ -183,7 +184,7 @@ fn emission(light: &description::Light, size: f64, notes: &mut Notes<'_>) -> Res
     let spectrum = spectrum(light, notes);
     let tint = match &spectrum {
         // A colour temperature is a stand-in for a spectrum.
-        None if light.enable_color_temperature => blackbody_rgb(light.color_temperature),
+        None if light.enable_color_temperature => rgb_of_temperature(light.color_temperature),
         _ => [1.0; 3],
     };
     if light.color.iter().any(|&channel| channel < 0.0) {
@@ -198,18 +199,18 @@ fn emission(light: &description::Light, size: f64, notes: &mut Notes<'_>) -> Res
     if rgb.iter().all(|&channel| channel <= 0.0) {
         return Ok(None);
     }
-    let illuminant = spectrum.unwrap_or(Illuminant::D65);
-    match Emission::new(rgb, illuminant) {
+    let d65 = Spectrum::Illuminant(Illuminant::D65);
+    match Emission::new(rgb, spectrum.unwrap_or_else(|| d65.clone())) {
         Some(emission) => Ok(Some(emission)),
         None => {
             notes.note("light", TABLE, "has no light that is visible: its colour alone counts".into());
-            Ok(Emission::new(rgb, Illuminant::D65))
+            Ok(Emission::new(rgb, d65))
         }
     }
 }
 
 /// The spectrum that a light asks for: by our attributes, else by PhysicalLightIlluminantAPI, else none.
-fn spectrum(light: &description::Light, notes: &mut Notes<'_>) -> Option<Illuminant> {
+fn spectrum(light: &description::Light, notes: &mut Notes<'_>) -> Option<Spectrum> {
     let (attribute, token) = match (light.abbe.get(ILLUMINANT), light.physical.get(PHYSICAL_ILLUMINANT)) {
         (Some(authored), _) => (ILLUMINANT, authored),
         (None, Some(authored)) => ("physical:illuminant", authored),
@@ -218,39 +219,41 @@ fn spectrum(light: &description::Light, notes: &mut Notes<'_>) -> Option<Illumin
         (None, None) => return None,
     };
     let is_ours = attribute == ILLUMINANT;
-    match token.value.as_str() {
-        Some("") if is_ours => None,
-        Some("D65") if is_ours => Some(Illuminant::D65),
-        Some("white") if !is_ours => Some(Illuminant::D65),
-        Some("A") if is_ours => Some(Illuminant::A),
-        Some("E") if is_ours => Some(Illuminant::E),
-        Some("blackbody") if light.color_temperature >= 1.0 => Some(Illuminant::Planck(light.color_temperature)),
-        Some("blackbody") => {
-            let message =
-                format!("is {} K, which makes no black body shine: its colour alone counts", light.color_temperature);
-            notes.note("light", "inputs:colorTemperature", message);
-            None
+    let name = token.value.as_str().unwrap_or_default();
+    let standard = match name {
+        "" if is_ours => return None,
+        "table" if is_ours => return table(light.abbe.get(TABLE), TABLE, notes),
+        "custom" if !is_ours => {
+            return table(light.physical.get(PHYSICAL_TABLE), "physical:customIlluminant", notes);
         }
-        Some("table") if is_ours => table(light.abbe.get(TABLE), TABLE, notes),
-        Some("custom") if !is_ours => table(light.physical.get(PHYSICAL_TABLE), "physical:customIlluminant", notes),
-        _ => {
-            let known = if is_ours { "D65, A, E, blackbody and table" } else { "white, blackbody and custom" };
-            notes.note(
-                "light",
-                attribute,
-                format!("is {}, and there are {known}: its colour alone counts", token.value),
-            );
-            None
-        }
+        // Colder than this nothing of it is seen, in doubles.
+        "blackbody" if light.color_temperature >= 100.0 => Some(Illuminant::BlackBody(light.color_temperature)),
+        "white" if !is_ours => Some(Illuminant::D65),
+        name if is_ours => Illuminant::named(name),
+        _ => None,
+    };
+    if standard.is_none() {
+        let message = if name == "blackbody" {
+            format!("is a black body of {} K, which does not shine: its colour alone counts", light.color_temperature)
+        } else {
+            let known = if is_ours {
+                "E, A, D40 to D250, FL2, FL7, FL11, blackbody and table"
+            } else {
+                "white, blackbody and custom"
+            };
+            format!("is {}, and there are {known}: its colour alone counts", token.value)
+        };
+        notes.note("light", attribute, message);
     }
+    standard.map(Spectrum::Illuminant)
 }
 
-fn table(authored: Option<&Authored>, attribute: &'static str, notes: &mut Notes<'_>) -> Option<Illuminant> {
+fn table(authored: Option<&Authored>, attribute: &'static str, notes: &mut Notes<'_>) -> Option<Spectrum> {
     let entries = authored.map(|authored| serde_json::from_value::<Vec<[f64; 2]>>(authored.value.clone()));
     let table = match entries {
         None => Err("is not there".into()),
         Some(Err(_)) => Err("is no list of pairs of numbers".into()),
-        Some(Ok(entries)) => Illuminant::table(&entries),
+        Some(Ok(entries)) => Spectrum::table(&entries),
     };
     table.map_err(|problem| notes.note("light", attribute, format!("{problem}: its colour alone counts"))).ok()
 }

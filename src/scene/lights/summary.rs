@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Lights;
-use crate::light::{Illuminant, Light, Shape, luminance};
+use crate::light::{Light, Shape, Spectrum, luminance};
 use crate::scene::Scene;
 use crate::scene::description::{Document, LightShape};
+use crate::spectrum::illuminant::{Illuminant, Lamp};
 
 /// One light as a listing has it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -24,8 +25,8 @@ pub struct Summary {
     pub area: Option<f64>,
     /// Emission in linear Rec. 709: luminance in nits of what is seen, illuminance in lux of parallel light.
     pub emission: [f64; 3],
-    /// `D65`, `A`, `E`, `blackbody 3200 K` or `table`.
-    pub illuminant: String,
+    /// `D65`, `A`, `E`, `FL2` …, `daylight` of another temperature, `blackbody 3200 K` or `table`.
+    pub spectrum: String,
     /// Luminous power, nits times area times steradian, of surfaces; textures taken as white.
     pub power: Option<f64>,
     /// Focus, cone or profile shape it.
@@ -66,12 +67,18 @@ impl Summary {
             // Points and lines have none.
             area: light.shape.area().filter(|_| !matches!(kind, "point" | "line")),
             emission: light.emission.rgb,
-            illuminant: match &light.emission.illuminant {
-                Illuminant::D65 => "D65".into(),
-                Illuminant::A => "A".into(),
-                Illuminant::E => "E".into(),
-                Illuminant::Planck(kelvin) => format!("blackbody {kelvin} K"),
-                Illuminant::Table(_) => "table".into(),
+            spectrum: match &light.emission.spectrum {
+                Spectrum::Table(_) => "table".into(),
+                Spectrum::Illuminant(illuminant) => match illuminant {
+                    Illuminant::E => "E".into(),
+                    Illuminant::A => "A".into(),
+                    Illuminant::D65 => "D65".into(),
+                    Illuminant::Daylight(_) => "daylight".into(),
+                    Illuminant::BlackBody(kelvin) => format!("blackbody {kelvin} K"),
+                    Illuminant::Fluorescent(Lamp::Fl2) => "FL2".into(),
+                    Illuminant::Fluorescent(Lamp::Fl7) => "FL7".into(),
+                    Illuminant::Fluorescent(Lamp::Fl11) => "FL11".into(),
+                },
             },
             power: light.power().map(luminance),
             shaped: light.shaping.is_some(),

@@ -3,7 +3,7 @@
 //! `inputs:colorTemperature` is a colour, not a spectrum: that of a black body in linear Rec. 709, scaled to luminance 1.
 //! USD computes it by a Catmull–Rom spline through one colour each 500 K (`UsdLuxBlackbodyTemperatureAsRgb`, OpenUSD,
 //! `pxr/usd/usdLux/blackbody.cpp`), and so does this, so that a stage has the same colours here: a test compares. The true
-//! spectrum is [`Illuminant::Planck`](super::Illuminant::Planck). 6500 K is near white, but not white, which is D65.
+//! spectrum is [`Illuminant::BlackBody`](crate::spectrum::illuminant::Illuminant::BlackBody). 6500 K is near white, but not white, which is D65.
 
 /// Lowest temperature, kelvin; below it counts as this.
 const COLDEST: f64 = 1000.0;
