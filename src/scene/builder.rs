@@ -12,7 +12,7 @@ use super::description::{self, Array, Description, Document, Element, Placement}
 use super::lights;
 use super::links::{self, Links};
 use super::manifest::Manifest;
-use super::material::{self, Context, Material, ScalarIor};
+use super::material::{self, Context, Material, Resources, ScalarIor};
 use super::meshes;
 use super::objects::{Appearance, ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
 use super::solids;
@@ -38,8 +38,10 @@ pub fn build(description: Description) -> Result<Scene> {
     let placed = || singles.iter().chain(prototypes.iter().flatten());
     let mut used = vec![false; document.shapes.len()];
     placed().for_each(|p| used[p.shape] = true);
-    let (materials, material_ids) = build_materials(document, placed(), &mut diagnostics)?;
-    let primvars = Vec::new();
+    let mut resources = Resources::new(&description);
+    let (materials, material_ids) = build_materials(document, placed(), &mut resources, &mut diagnostics)?;
+    let display_color = material::display_color(&mut resources);
+    let Resources { store: textures, primvars, .. } = resources;
     let shapes = build_shapes(&description, &used, &primvars, &mut diagnostics)?;
 
     let mut compiler = Compiler {
@@ -107,7 +109,20 @@ pub fn build(description: Description) -> Result<Scene> {
         materials: materials.len() as u64,
     };
     let skipped = document.skipped.clone();
-    Ok(Scene { objects, links, materials, prims, instances, skipped, counts, diagnostics, description })
+    let textures = Arc::new(textures);
+    Ok(Scene {
+        objects,
+        links,
+        materials,
+        textures,
+        display_color,
+        prims,
+        instances,
+        skipped,
+        counts,
+        diagnostics,
+        description,
+    })
 }
 
 fn too_many(path: &str) -> Error {
@@ -452,6 +467,7 @@ impl<'a> NamedArrays<'a> {
 fn build_materials<'a>(
     document: &Document,
     placed: impl Iterator<Item = &'a Placed<'a>>,
+    resources: &mut Resources<'_>,
     diagnostics: &mut Diagnostics,
 ) -> Result<(Vec<Material>, Vec<u32>)> {
     let mut used = vec![false; document.materials.len()];
@@ -466,7 +482,7 @@ fn build_materials<'a>(
     let context = Context { scalar_ior: scalar_ior(document)?, meters_per_unit: document.stage.meters_per_unit };
     for (i, authored) in document.materials.iter().enumerate() {
         if used[i] {
-            materials.push(material::compile(authored, &context, diagnostics)?);
+            materials.push(material::compile(authored, &context, resources, diagnostics)?);
             ids[i] = materials.len() as u32;
         }
     }
