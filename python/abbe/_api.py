@@ -14,7 +14,18 @@ from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 from . import _core
 from .errors import UsageError
 
-__all__ = ["Options", "Plan", "Progress", "Scene", "counted", "integrators", "merge", "render", "warning_text"]
+__all__ = [
+    "Options",
+    "Plan",
+    "Progress",
+    "Scene",
+    "asks_for_motion",
+    "counted",
+    "integrators",
+    "merge",
+    "render",
+    "warning_text",
+]
 
 _log = logging.getLogger("abbe")
 
@@ -57,6 +68,7 @@ class Options(TypedDict, total=False):
     wavelength: float | None
     band: tuple[float, float] | None
     dispersion_scale: float | None
+    motion_blur: bool | None
     seed: int | None
     threads: int | None
     crop: tuple[int, int, int, int] | None
@@ -107,6 +119,13 @@ def _request(options: Options) -> str:
     return "{" + ",".join(texts) + "}"
 
 
+def asks_for_motion(aovs: Sequence[str] | None) -> bool | None:
+    """Tell whether some of ``aovs`` are vectors of motion; None, for the stage to decide, if there are none."""
+    from .usd.tokens import MOTION_SOURCES
+
+    return None if aovs is None else not {*aovs}.isdisjoint(MOTION_SOURCES)
+
+
 def counted(count: int, what: str) -> str:
     """Return ``1 camera``, ``2 cameras``."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
@@ -145,6 +164,8 @@ class Scene:
         mask: Sequence[str] = (),
         payloads: str = "all",
         missing: str = "warn",
+        motion_blur: bool = True,
+        motion_vectors: bool | None = None,
         scalar_ior: str | None = None,
         strict: bool = False,
     ) -> Scene:
@@ -165,6 +186,8 @@ class Scene:
         mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
         payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
         missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+        motion_blur : read motion while shutters are open; False reads none for that
+        motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
         scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
         strict : a stage without a camera is an error
 
@@ -198,6 +221,8 @@ class Scene:
             mask=mask,
             payloads=payloads,
             missing=missing,
+            motion_blur=motion_blur,
+            motion_vectors=motion_vectors,
             scalar_ior=scalar_ior,
             strict=strict,
         )
@@ -404,6 +429,7 @@ def render(
     wavelength: float | None = None,
     band: tuple[float, float] | None = None,
     dispersion_scale: float | None = None,
+    motion_blur: bool | None = None,
     seed: int | None = None,
     threads: int | None = None,
     crop: tuple[int, int, int, int] | None = None,
@@ -439,6 +465,7 @@ def render(
     wavelength : reference wavelength, nm
     band : ends of the wavelength band of footprints, nm
     dispersion_scale : multiplies all dispersion: 0 none, 1 physical
+    motion_blur : False closes all shutters at the frame
     seed : same seed, same bits, on any number of threads
     threads : all of the machine's if None
     crop : x0, y0, x1, y1 in pixels, half-open, y down
@@ -479,6 +506,8 @@ def render(
         mask=mask,
         payloads=payloads,
         missing=missing,
+        motion_blur=motion_blur is not False,
+        motion_vectors=asks_for_motion(aovs),
         scalar_ior=scalar_ior,
         strict=strict,
     )
@@ -493,6 +522,7 @@ def render(
         wavelength=wavelength,
         band=band,
         dispersion_scale=dispersion_scale,
+        motion_blur=motion_blur,
         seed=seed,
         threads=threads,
         crop=crop,

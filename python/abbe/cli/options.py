@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from typing import Any, Literal
 
-from .._api import Options, Scene
+from .._api import Options, Scene, asks_for_motion
 from ..errors import NotUsdError, UsageError
 from . import messages
 
@@ -170,6 +170,11 @@ def add_request(parser: argparse.ArgumentParser) -> None:
         "--dispersion-scale", type=float, metavar="S", help="multiplies all dispersion: 0 none, 1 physical"
     )
     add_scalar_ior(group)
+    group.add_argument(
+        "--no-motion-blur",
+        action="store_true",
+        help="close all shutters at the frame",
+    )
     group.add_argument("--seed", type=int, metavar="N", help="same seed, same bits")
     group.add_argument(
         "--threads", type=int, metavar="N", help="all of the machine's unless given; never changes a bit"
@@ -200,6 +205,7 @@ def request(args: argparse.Namespace, from_stage: bool) -> Options:
         wavelength=args.wavelength,
         band=args.band,
         dispersion_scale=args.dispersion_scale,
+        motion_blur=False if args.no_motion_blur else None,
         seed=args.seed,
         threads=args.threads,
         crop=args.crop,
@@ -259,6 +265,8 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
                 mask=args.mask,
                 payloads=args.payloads,
                 missing=args.missing,
+                motion_blur=not getattr(args, "no_motion_blur", False),
+                motion_vectors=asks_for_motion(args.aov) if hasattr(args, "aov") else True,
                 scalar_ior=args.scalar_ior,
                 strict=args.strict,
             )

@@ -33,6 +33,8 @@ def describe(
     mask: Sequence[str] = (),
     payloads: str = "all",
     missing: str = "warn",
+    motion_blur: bool = True,
+    motion_vectors: bool | None = None,
     scalar_ior: str | None = None,
     strict: bool = False,
 ) -> Description:
@@ -53,6 +55,8 @@ def describe(
     mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
     payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
     missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+    motion_blur : read motion while shutters are open; False reads none for that
+    motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
     scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
     strict : a stage without a camera is an error
 
@@ -88,6 +92,8 @@ def describe(
         mask=mask,
         payloads=payloads,
         missing=missing,
+        motion_blur=motion_blur,
+        motion_vectors=motion_vectors,
         strict=strict,
     )
     if scalar_ior is not None:
