@@ -88,6 +88,8 @@ fn placement(path: &str, target: Target) -> Placement {
         subset_materials: vec![],
         primvars: Default::default(),
         double_sided: false,
+        hidden_from_camera: false,
+        matte: false,
     }
 }
 

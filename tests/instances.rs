@@ -161,6 +161,8 @@ fn lenses_and_solids_of_an_array_are_those_placed_one_by_one() {
             motion: None,
             instance: Some(format!("/World/Lamp{i}")),
             double_sided: false,
+            hidden_from_camera: false,
+            matte: false,
         });
     }
     assert_same_pixels(&array, &scene(native.description()));

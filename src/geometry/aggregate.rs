@@ -355,6 +355,22 @@ impl Aggregate {
         })
     }
 
+    /// Whether some surface of an instance that `is_member` may lie in the box `[min, max]`, in render space; a no is certain.
+    pub fn has_surface_in(&self, [min, max]: [DVec3; 2], is_member: impl Fn(u32) -> bool) -> bool {
+        let search = Bounds { min, max };
+        let margin = search.reach().max(self.tree.reach()) * self.spread * 2f64.powi(-46);
+        let search = Bounds { min: min - margin, max: max + margin };
+        self.tree.any_meeting(&search, |i| {
+            let instance = self.instance(i);
+            is_member(instance)
+                && self
+                    .bounds_of(instance)
+                    .is_some_and(|bounds| bounds.min.cmple(search.max).all() && search.min.cmple(bounds.max).all())
+                && (self.is_instance_moving(instance)
+                    || self.with(instance, 0.0, |placed| placed.may_meet(&search)) == Some(true))
+        })
+    }
+
     /// What `intersect` finds by asking every primitive: the law that trees are tested against.
     #[doc(hidden)]
     pub fn intersect_without_tree(&self, ray: &Ray) -> Option<Hit> {

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::description::{self, Array, Description, Document, Element, Placement};
 use super::manifest::Manifest;
 use super::material::{self, Context, Material, ScalarIor};
-use super::objects::{ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
+use super::objects::{Appearance, ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
 use super::solids;
 use super::unroll::{self, Placed, Unrolled};
 use super::{Counts, Scene};
@@ -48,7 +48,9 @@ pub fn build(description: Description) -> Result<Scene> {
     };
     let mut objects = Vec::with_capacity(singles.len());
     for single in &singles {
-        let Some((shape, PartIds { prim_id, material_ids, .. })) = compiler.part(single, &mut diagnostics)? else {
+        let Some((shape, PartIds { prim_id, material_ids, appearance, .. })) =
+            compiler.part(single, &mut diagnostics)?
+        else {
             continue;
         };
         let instance_id = match single.instance {
@@ -57,7 +59,7 @@ pub fn build(description: Description) -> Result<Scene> {
         };
         let primvars = constants(single.placement, &primvars)?;
         let world_from_object = single.transform.clone();
-        objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars });
+        objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars, appearance });
     }
     let prototypes = prototypes
         .iter()
@@ -156,7 +158,9 @@ impl Compiler<'_> {
             self.triangles += report.triangles;
         }
         let material_ids = self.slots.entry(list).or_insert_with_key(|list| list.as_slice().into()).clone();
-        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids, primvars: None })))
+        let &Placement { hidden_from_camera, matte, .. } = placement;
+        let appearance = Appearance { hidden_from_camera, matte };
+        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids, primvars: None, appearance })))
     }
 }
 

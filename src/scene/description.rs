@@ -419,6 +419,12 @@ pub struct Placement {
     /// name without `primvars:`, one to four numbers.
     #[serde(default)]
     pub primvars: BTreeMap<String, Vec<f64>>,
+    /// Camera rays pass through it unseen; rays that were refracted or reflected meet it.
+    #[serde(default)]
+    pub hidden_from_camera: bool,
+    /// It holds out what is behind it: nothing of it shows, and alpha is 0 there.
+    #[serde(default)]
+    pub matte: bool,
     /// Lit and shaded from both sides; for glass the sides are decided by the normal alone.
     #[serde(default)]
     pub double_sided: bool,
@@ -478,7 +484,7 @@ pub struct Shader {
 }
 
 /// A camera as authored (UsdGeomCamera: apertures and focal length in tenths of a stage unit).
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
     /// Prim path; empty for a camera that the bridge framed by itself.
@@ -502,12 +508,21 @@ pub struct Camera {
     /// Near and far, stage units.
     #[serde(default)]
     pub clipping_range: Option<[f64; 2]>,
+    /// Whether `clipping_range` is authored, not a fallback.
+    #[serde(default)]
+    pub clipping_authored: bool,
+    /// Planes (a, b, c, d): what is seen has a x + b y + c z + d ≥ 0 in camera space.
+    #[serde(default)]
+    pub clipping_planes: Vec<[f64; 4]>,
     /// 0 for a pinhole.
     #[serde(default)]
     pub f_stop: f64,
     /// Stage units.
     #[serde(default)]
     pub focus_distance: f64,
+    /// What the sensor makes of light; nothing of it is applied to derivatives.
+    #[serde(default)]
+    pub exposure: Option<Exposure>,
     /// Shutter opening, frames relative to the time code.
     #[serde(default)]
     pub shutter_open: f64,
@@ -517,6 +532,22 @@ pub struct Camera {
     /// The transform at other times than the frame.
     #[serde(default)]
     pub motion: Option<Motion>,
+}
+
+/// Exposure of a camera (UsdGeomCamera: `exposure`, `exposure:time` …).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Exposure {
+    /// Compensation, powers of 2.
+    pub stops: f64,
+    /// Seconds.
+    pub time: f64,
+    /// Speed of the sensor.
+    pub iso: f64,
+    /// The f-number that lets light in; that of the lens' blur is [`Camera::f_stop`].
+    pub f_stop: f64,
+    /// Of the sensor.
+    pub responsivity: f64,
 }
 
 /// Render settings with their products flattened by the rules of UsdRenderComputeSpec.

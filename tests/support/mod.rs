@@ -189,6 +189,8 @@ impl Stagehand {
             subset_materials: vec![],
             primvars: Default::default(),
             double_sided: false,
+            hidden_from_camera: false,
+            matte: false,
         });
     }
 
@@ -227,15 +229,8 @@ impl Stagehand {
             projection: "perspective".into(),
             horizontal_aperture: 36.0,
             vertical_aperture: 24.0,
-            horizontal_aperture_offset: 0.0,
-            vertical_aperture_offset: 0.0,
             focal_length: 35.0,
-            clipping_range: None,
-            f_stop: 0.0,
-            focus_distance: 0.0,
-            shutter_open: 0.0,
-            shutter_close: 0.0,
-            motion: None,
+            ..Camera::default()
         });
     }
 
