@@ -166,6 +166,7 @@ class Scene:
         missing: str = "warn",
         motion_blur: bool = True,
         motion_vectors: bool | None = None,
+        complexity: str | None = None,
         scalar_ior: str | None = None,
         strict: bool = False,
     ) -> Scene:
@@ -188,6 +189,8 @@ class Scene:
         missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
         motion_blur : read motion while shutters are open; False reads none for that
         motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
+        complexity : ``"low"``, ``"medium"``, ``"high"``, ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
+            ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
         scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
         strict : a stage without a camera is an error
 
@@ -223,6 +226,7 @@ class Scene:
             missing=missing,
             motion_blur=motion_blur,
             motion_vectors=motion_vectors,
+            complexity=complexity,
             scalar_ior=scalar_ior,
             strict=strict,
         )
@@ -442,6 +446,7 @@ def render(
     mask: Sequence[str] = (),
     payloads: str = "all",
     missing: str = "warn",
+    complexity: str | None = None,
     scalar_ior: str | None = None,
     strict: bool = False,
     progress: Callable[[Progress], object] | None = None,
@@ -470,7 +475,7 @@ def render(
     threads : all of the machine's if None
     crop : x0, y0, x1, y1 in pixels, half-open, y down
     sample_range : begin and end, half-open: a part that :func:`merge` joins with others
-    purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, scalar_ior : as for
+    purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, complexity, scalar_ior : as for
         :meth:`Scene.from_stage`
     strict : any warning, of the stage or the request, is an error
     progress : called about ten times a second; ``print`` will do
@@ -508,6 +513,7 @@ def render(
         missing=missing,
         motion_blur=motion_blur is not False,
         motion_vectors=asks_for_motion(aovs),
+        complexity=complexity,
         scalar_ior=scalar_ior,
         strict=strict,
     )

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::description::{self, Array, Description, Document, Element, Placement};
 use super::manifest::Manifest;
 use super::material::{self, Context, Material, ScalarIor};
+use super::meshes;
 use super::objects::{Appearance, ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
 use super::solids;
 use super::unroll::{self, Placed, Unrolled};
@@ -222,7 +223,7 @@ fn build_shapes(
             }
         };
         if let (description::Shape::Mesh(mesh), Some(report)) = (shape, &report) {
-            report_mesh(mesh, report, diagnostics);
+            meshes::report(mesh, report, diagnostics);
         }
         let report = match report {
             None => {
@@ -242,19 +243,6 @@ fn build_shapes(
         shapes.push(Some((compiled, report)));
     }
     Ok(shapes)
-}
-
-fn report_mesh(mesh: &description::Mesh, report: &MeshReport, diagnostics: &mut Diagnostics) {
-    if report.degenerate > 0 {
-        diagnostics.warn(
-            "degenerate-faces",
-            &mesh.path,
-            format!("{} triangles without area are left out", report.degenerate),
-        );
-    }
-    if report.triangles == 0 {
-        diagnostics.warn("empty-mesh", &mesh.path, "it has no face with an area: nothing of it is seen");
-    }
 }
 
 /// What became of a shape.
@@ -309,6 +297,7 @@ fn compile_shape(description: &Description, shape: &description::Shape, names: &
                 uv_number: names.iter().position(|name| mesh.uv_name.as_ref() == Some(name)),
                 primvars: names.iter().map(|name| arrays.named_primvar(mesh, name)).collect::<Result<_>>()?,
                 subsets: &subsets,
+                subdivision: meshes::subdivision(&arrays, mesh, counts)?,
             };
             let normals = polygons.normals.as_ref().map(|normals| normals.values.len());
             let deformation = match &mesh.motion {
@@ -359,7 +348,7 @@ impl<'a> NamedArrays<'a> {
     }
 
     /// Shares the memory of a float array.
-    fn buffer<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
+    pub(super) fn buffer<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
         self.share(name, Element::F32, columns)
     }
 
@@ -410,7 +399,7 @@ impl<'a> NamedArrays<'a> {
         Ok(Ok(Deformation { times: times.clone(), points: moved, normals }))
     }
 
-    fn integers(&self, name: &str) -> Result<&'a [i32]> {
+    pub(super) fn integers(&self, name: &str) -> Result<&'a [i32]> {
         let array = self.get(name, Element::I32, 1)?;
         bytemuck::try_cast_slice(&array.bytes).map_err(|_| {
             Error::scene(self.place, format!("array '{name}' is not aligned to its elements: write the file again"))

@@ -291,9 +291,47 @@ pub struct Mesh {
     /// Faces with materials of their own. Faces in none have the placement's material.
     #[serde(default)]
     pub subsets: Vec<Subset>,
+    /// How it is the control mesh of a subdivision surface; a polygon mesh if absent.
+    #[serde(default)]
+    pub subdivision: Option<Subdivision>,
     /// Where the points are at other times than the frame; they do not move if absent.
     #[serde(default)]
     pub motion: Option<MeshMotion>,
+}
+
+/// How a mesh is subdivided.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Subdivision {
+    /// `catmullClark`, `loop` or `bilinear`.
+    pub scheme: String,
+    /// How often faces are divided; 0 shows the control mesh. The renderer's default if absent.
+    #[serde(default)]
+    pub level: Option<u32>,
+    /// `none`, `edgeOnly` or `edgeAndCorner`; the last if absent.
+    #[serde(default)]
+    pub interpolate_boundary: Option<String>,
+    /// `none`, `cornersOnly`, `cornersPlus1`, `cornersPlus2`, `boundaries` or `all`; `cornersPlus1` if absent.
+    #[serde(default)]
+    pub face_varying_linear_interpolation: Option<String>,
+    /// `catmullClark` or `smooth`; the first if absent.
+    #[serde(default)]
+    pub triangle_subdivision_rule: Option<String>,
+    /// Array i32: points of all creases, one crease after the other.
+    #[serde(default)]
+    pub crease_indices: Option<String>,
+    /// Array i32: points of each crease.
+    #[serde(default)]
+    pub crease_lengths: Option<String>,
+    /// Array f32: one a crease, or one for each edge of every crease.
+    #[serde(default)]
+    pub crease_sharpnesses: Option<String>,
+    /// Array i32: points that are sharp.
+    #[serde(default)]
+    pub corner_indices: Option<String>,
+    /// Array f32: one a corner.
+    #[serde(default)]
+    pub corner_sharpnesses: Option<String>,
 }
 
 /// Transforms at other times than the frame, whose own stands beside them: linear between the samples, held beyond.

@@ -8,6 +8,7 @@ pub mod description;
 pub mod file;
 mod manifest;
 pub mod material;
+mod meshes;
 mod objects;
 mod solids;
 mod unroll;

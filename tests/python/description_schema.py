@@ -152,15 +152,19 @@ def _check_arrays(document, arrays):
                     array(primvar["indices"], np.int32, 1, where)
                 assert primvar["interpolation"] in ("constant", "uniform", "varying", "vertex", "faceVarying")
         motion = mesh.get("motion") or {"times": [], "points": []}
-        assert len(motion["points"]) == len(motion["times"]) and motion.get("normals", []) in (
-            [],
-            motion.get("normals"),
-        )
+        assert len(motion["points"]) == len(motion["times"]), where
         assert motion["times"] == sorted(set(motion["times"])), f"{where}: {motion['times']}"
         for names, like in ((motion["points"], mesh["points"]), (motion.get("normals", []), None)):
             for name in names:
                 array(name, np.float32, 3, where)
                 assert like is None or arrays[name].shape == arrays[like].shape, where
+        subdivision = mesh.get("subdivision") or {}
+        for name in ("crease_indices", "crease_lengths", "corner_indices"):
+            if name in subdivision:
+                array(subdivision[name], np.int32, 1, where)
+        for name in ("crease_sharpnesses", "corner_sharpnesses"):
+            if name in subdivision:
+                array(subdivision[name], np.float32, 1, where)
         for subset in mesh.get("subsets", []):
             array(subset["faces"], np.int32, 1, where)
     for index, texture in enumerate(document.get("textures", [])):

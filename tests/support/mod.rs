@@ -162,6 +162,7 @@ impl Stagehand {
             uv_name: None,
             primvars: BTreeMap::new(),
             subsets: vec![],
+            subdivision: None,
             motion: None,
         }));
         self.place(path, transform, material);

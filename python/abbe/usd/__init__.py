@@ -35,6 +35,7 @@ def describe(
     missing: str = "warn",
     motion_blur: bool = True,
     motion_vectors: bool | None = None,
+    complexity: str | None = None,
     scalar_ior: str | None = None,
     strict: bool = False,
 ) -> Description:
@@ -57,6 +58,8 @@ def describe(
     missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
     motion_blur : read motion while shutters are open; False reads none for that
     motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
+    complexity : ``"low"``, ``"medium"``, ``"high"`` or ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
+        ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
     scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
     strict : a stage without a camera is an error
 
@@ -94,6 +97,7 @@ def describe(
         missing=missing,
         motion_blur=motion_blur,
         motion_vectors=motion_vectors,
+        complexity=complexity,
         strict=strict,
     )
     if scalar_ior is not None:
