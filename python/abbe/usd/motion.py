@@ -28,7 +28,7 @@ __all__ = ["MotionReader", "motion_span"]
 
 def motion_span(
     stage: Any,
-    time_code: float | None,
+    time: Any,
     cameras: Sequence[dict[str, Any]],
     settings: dict[str, Any],
     blur: bool,
@@ -38,7 +38,7 @@ def motion_span(
 
     Parameters
     ----------
-    time_code : of the frame; without one nothing moves
+    time : time code of the frame; nothing moves about default values, and what is read at the earliest time is at 0
     cameras, settings : of the description
     blur : whether shutters count
     vectors : whether motion to the next frame is asked for; None if the render variables say so
@@ -56,10 +56,11 @@ def motion_span(
         vectors = not sources.isdisjoint(tokens.MOTION_SOURCES)
     if vectors:
         marks.add(1.0)
-    if time_code is None or len(marks) == 1:
+    if time.IsDefault() or len(marks) == 1:
         return None
     held = stage.GetInterpolationType() == Usd.InterpolationTypeHeld
-    return Span(time_code, tuple(sorted(marks)), held)
+    frame = 0.0 if time.IsEarliestTime() else float(time.GetValue())
+    return Span(frame, tuple(sorted(marks)), held)
 
 
 class MotionReader:

@@ -562,7 +562,7 @@ def _read(
     settings = read_settings(
         stage, settings_prim, time, time_code or 0.0, product, camera_index, bool(camera), source, diagnostics
     )
-    span = motion_span(stage, time_code, cameras, settings, motion_blur, motion_vectors)
+    span = motion_span(stage, time, cameras, settings, motion_blur, motion_vectors)
     if span is not None:
         metadata["motion"] = [span.marks[0], span.marks[-1]]
         walk.add_motion(MotionReader(span, diagnostics), zip(index_by_camera, cameras, strict=False))
