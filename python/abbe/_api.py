@@ -63,6 +63,7 @@ class Options(TypedDict, total=False):
     width: int | None
     height: int | None
     samples: int | None
+    depth_of_field: bool | None
     integrator: str | None
     aovs: Sequence[str] | None
     wavelength: float | None
@@ -155,6 +156,7 @@ class Scene:
         frame: float | Literal["default"] | None = None,
         camera: str | None = None,
         render_settings: str | None = None,
+        render_pass: str | None = None,
         product: str | None = None,
         purposes: Sequence[str] | None = None,
         variants: Sequence[str] = (),
@@ -164,7 +166,7 @@ class Scene:
         mask: Sequence[str] = (),
         payloads: str = "all",
         missing: str = "warn",
-        motion_blur: bool = True,
+        motion_blur: bool | None = None,
         motion_vectors: bool | None = None,
         complexity: str | None = None,
         scalar_ior: str | None = None,
@@ -178,6 +180,7 @@ class Scene:
         frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
         camera : path of a Camera, or the name of the first such; it then replaces the cameras that products name
         render_settings : path of a RenderSettings prim; the stage's own if None
+        render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
         product : path or name of the one RenderProduct to keep
         purposes : of default, render, proxy, guide; the settings', else default and render, if None
         variants : selections such as ``"/World/Ball{material=glass}"``
@@ -187,7 +190,7 @@ class Scene:
         mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
         payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
         missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
-        motion_blur : read motion while shutters are open; False reads none for that
+        motion_blur : whether to read motion while shutters are open; as the stage's products say if None
         motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
         complexity : ``"low"``, ``"medium"``, ``"high"``, ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
             ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
@@ -215,6 +218,7 @@ class Scene:
             frame=frame,
             camera=camera,
             render_settings=render_settings,
+            render_pass=render_pass,
             product=product,
             purposes=purposes,
             variants=variants,
@@ -424,10 +428,12 @@ def render(
     frame: float | Literal["default"] | None = None,
     camera: str | None = None,
     render_settings: str | None = None,
+    render_pass: str | None = None,
     product: str | None = None,
     width: int | None = None,
     height: int | None = None,
     samples: int | None = None,
+    depth_of_field: bool | None = None,
     integrator: str | None = None,
     aovs: Sequence[str] | None = None,
     wavelength: float | None = None,
@@ -462,15 +468,17 @@ def render(
     frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
     camera : path of a Camera, or the name of the first such
     render_settings : path of a RenderSettings prim
+    render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
     product : path of a RenderProduct; needed where the stage has several
     width, height : pixels, >= 1; one alone keeps the aspect
     samples : samples per pixel, >= 1
+    depth_of_field : spread samples over the camera's lens; as the stage says if None
     integrator : a name of :func:`integrators`
     aovs : names of AOVs or aliases of them (``abbe aovs`` lists them); the stage's RenderVars if None
     wavelength : reference wavelength, nm
     band : ends of the wavelength band of footprints, nm
     dispersion_scale : multiplies all dispersion: 0 none, 1 physical
-    motion_blur : False closes all shutters at the frame
+    motion_blur : whether samples are spread over the time that the shutter is open
     seed : same seed, same bits, on any number of threads
     threads : all of the machine's if None
     crop : x0, y0, x1, y1 in pixels, half-open, y down
@@ -502,6 +510,7 @@ def render(
         frame=frame,
         camera=camera,
         render_settings=render_settings,
+        render_pass=render_pass,
         product=product,
         purposes=purposes,
         variants=variants,
@@ -511,7 +520,7 @@ def render(
         mask=mask,
         payloads=payloads,
         missing=missing,
-        motion_blur=motion_blur is not False,
+        motion_blur=motion_blur,
         motion_vectors=asks_for_motion(aovs),
         complexity=complexity,
         scalar_ior=scalar_ior,
@@ -523,6 +532,7 @@ def render(
         width=width,
         height=height,
         samples=samples,
+        depth_of_field=depth_of_field,
         integrator=integrator,
         aovs=aovs,
         wavelength=wavelength,

@@ -68,6 +68,27 @@ pub struct Aov {
     pub doc: &'static str,
 }
 
+/// What 11 bits of mantissa and a range of 65504 are enough for: colours and unit vectors.
+const SOUND_IN_HALF: &[&str] = &[
+    "color",
+    "albedo",
+    "refracted_albedo",
+    "emission",
+    "refracted_emission",
+    "normal",
+    "normal_geometric",
+    "refracted_normal",
+    "refracted_normal_geometric",
+    INTERNAL_TRANSMITTANCE,
+];
+
+impl Aov {
+    /// Whether half floats hold what its values are for.
+    pub fn is_sound_in_half(&self) -> bool {
+        SOUND_IN_HALF.contains(&self.name)
+    }
+}
+
 const XYZ: &[&str] = &["X", "Y", "Z"];
 const XY: &[&str] = &["X", "Y"];
 const UV: &[&str] = &["U", "V"];

@@ -3,6 +3,8 @@
 //! Tiles are rendered by any thread in any order; what a pixel gets depends on the pixel alone, so the film has the same
 //! bits for any number of threads. Cancelling leaves the finished tiles.
 
+mod driver;
+mod layers;
 pub mod metadata;
 mod motion;
 pub mod plan;
@@ -19,6 +21,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
+pub use layers::PlannedLayer;
 pub use plan::{Plan, plan};
 pub use request::Request;
 pub use trace::trace;
@@ -287,7 +290,11 @@ fn empty_film(plan: &Plan, camera: &Camera) -> Result<Film> {
         window: plan.window,
         pixel_aspect_ratio: camera.pixel_aspect_ratio as f32,
         samples: plan.samples,
-        layers: plan.layers.iter().map(|layer| Layer::new(layer.aov, layer.name.clone(), pixels, keep_sums)).collect(),
+        layers: plan
+            .layers
+            .iter()
+            .map(|layer| Layer { half: layer.half, ..Layer::new(layer.aov, layer.name.clone(), pixels, keep_sums) })
+            .collect(),
     })
 }
 

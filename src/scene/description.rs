@@ -130,6 +130,9 @@ pub struct Stage {
     /// Frames per second of the stage.
     #[serde(default)]
     pub frames_per_second: Option<f64>,
+    /// Time codes per second of the stage.
+    #[serde(default)]
+    pub time_codes_per_second: Option<f64>,
     /// The interval about the frame in which motion was looked for; absent if it was not.
     #[serde(default)]
     pub motion: Option<[f64; 2]>,
@@ -572,20 +575,25 @@ pub struct Camera {
     pub motion: Option<Motion>,
 }
 
-/// Exposure of a camera (UsdGeomCamera: `exposure`, `exposure:time` …).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// What is authored of a camera's exposure (UsdGeomCamera: `exposure`, `exposure:time` …).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exposure {
     /// Compensation, powers of 2.
-    pub stops: f64,
+    #[serde(default)]
+    pub stops: Option<f64>,
     /// Seconds.
-    pub time: f64,
+    #[serde(default)]
+    pub time: Option<f64>,
     /// Speed of the sensor.
-    pub iso: f64,
+    #[serde(default)]
+    pub iso: Option<f64>,
     /// The f-number that lets light in; that of the lens' blur is [`Camera::f_stop`].
-    pub f_stop: f64,
+    #[serde(default)]
+    pub f_stop: Option<f64>,
     /// Of the sensor.
-    pub responsivity: f64,
+    #[serde(default)]
+    pub responsivity: Option<f64>,
 }
 
 /// Render settings with their products flattened by the rules of UsdRenderComputeSpec.

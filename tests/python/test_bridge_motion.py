@@ -8,7 +8,7 @@ pytest.importorskip("pxr.Usd", reason="the bridge needs usd-core")
 
 from pxr import Gf, Sdf, Usd, UsdGeom
 
-from abbe.usd import describe
+from abbe.usd import describe, keep_open
 from abbe.usd.sampling import MOST_PIECES, ROUNDNESS
 
 HEAD = '#usda 1.0\n(\n startTimeCode = 1\n endTimeCode = 10\n timeCodesPerSecond = 24\n upAxis = "Y"\n)\n'
@@ -331,3 +331,18 @@ def test_native_instances_move_by_themselves():
         motion = found[f"/I{i}/S"]["motion"]
         assert motion["transforms"][-1][12] == pytest.approx(0.5 * i)
     assert Gf.Matrix4d(*found["/I1/S"].get("transform", np.eye(4).ravel().tolist())) == Gf.Matrix4d(1)
+
+
+def test_a_stage_that_is_kept_open_is_read_once_and_tells_the_same(tmp_path, monkeypatch):
+    path = tmp_path / "wheel.usda"
+    path.write_text(HEAD + WHEEL + CAMERA.format(*SHUTTER, "") + 'def "Lost" (\n references = @./lost.usda@\n)\n{\n}\n')
+    opened = []
+    compose = Usd.Stage.Open
+    monkeypatch.setattr(Usd.Stage, "Open", lambda *args: opened.append(args) or compose(*args))
+    kept = keep_open(path)
+    for frame in (1, 2, 3):
+        alone = checked(str(path), frame=frame)
+        together = checked(kept, frame=frame)
+        assert together.document == alone.document
+        assert together.arrays.keys() == alone.arrays.keys()
+    assert len(opened) == 3 + 1

@@ -41,6 +41,7 @@ impl Stagehand {
                 up_axis: "Y".into(),
                 time_code: None,
                 frames_per_second: Some(24.0),
+                time_codes_per_second: Some(24.0),
                 motion: None,
             },
             shapes: vec![],

@@ -16,10 +16,7 @@ def add(commands: Any) -> None:
     options.add_stage(parser)
     parser.add_argument("out", metavar="SCENE.safetensors", help="the file to write")
     group = parser.add_argument_group("what goes into the scene")
-    group.add_argument("--camera", "-cam", metavar="P", help="path of a camera, or its name")
-    group.add_argument(
-        "--render-settings", "--renderSettingsPrimPath", "-rs", metavar="P", help="path of a RenderSettings prim"
-    )
+    options.add_settings(group)
     group.add_argument("--product", metavar="P", help="path of the one RenderProduct to keep")
     options.add_scalar_ior(group)
     group.add_argument("--strict", action="store_true", help="a stage without a camera is an error")

@@ -15,6 +15,7 @@ __all__ = [
     "add_quiet",
     "add_request",
     "add_scalar_ior",
+    "add_settings",
     "add_stage",
     "numbers",
     "open_scene",
@@ -148,19 +149,41 @@ def add_scalar_ior(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def add_request(parser: argparse.ArgumentParser) -> None:
-    """Add what to render."""
-    group = parser.add_argument_group("the image (what is not given, the stage's render settings decide)")
+def add_settings(group: argparse._ArgumentGroup) -> None:
+    """Add which camera and which render settings."""
     group.add_argument("--camera", "-cam", metavar="P", help="path of a camera, or its name")
     group.add_argument(
         "--render-settings", "--renderSettingsPrimPath", "-rs", metavar="P", help="path of a RenderSettings prim"
     )
+    group.add_argument(
+        "--render-pass",
+        "--renderPassPrimPath",
+        "-rp",
+        metavar="P",
+        help="path of a RenderPass prim: its render settings, and what it shows, hides and prunes",
+    )
+
+
+def add_request(parser: argparse.ArgumentParser) -> None:
+    """Add what to render."""
+    group = parser.add_argument_group("the image (what is not given, the stage's render settings decide)")
+    add_settings(group)
     group.add_argument("--product", metavar="P", help="path of the one RenderProduct to render")
     group.add_argument(
         "--width", "--imageWidth", "-w", type=int, metavar="N", help="pixels; alone, it keeps the aspect"
     )
     group.add_argument("--height", type=int, metavar="N", help="pixels; alone, it keeps the aspect")
     group.add_argument("--samples", type=int, metavar="N", help="samples per pixel")
+    group.add_argument(
+        "--depth-of-field",
+        choices=("on", "off"),
+        help="spread samples over the camera's lens, or not; as the stage says unless given",
+    )
+    group.add_argument(
+        "--motion-blur",
+        choices=("on", "off"),
+        help="spread samples over the time that the shutter is open, or not; as the stage says unless given",
+    )
     group.add_argument("--integrator", metavar="NAME", help="what computes a pixel; `abbe aovs` lists them")
     group.add_argument(
         "--aov", action="append", metavar="NAME", help="an AOV to render, instead of the stage's; repeat for more"
@@ -176,11 +199,6 @@ def add_request(parser: argparse.ArgumentParser) -> None:
         "--dispersion-scale", type=float, metavar="S", help="multiplies all dispersion: 0 none, 1 physical"
     )
     add_scalar_ior(group)
-    group.add_argument(
-        "--no-motion-blur",
-        action="store_true",
-        help="close all shutters at the frame",
-    )
     group.add_argument("--seed", type=int, metavar="N", help="same seed, same bits")
     group.add_argument(
         "--threads", type=int, metavar="N", help="all of the machine's unless given; never changes a bit"
@@ -206,12 +224,13 @@ def request(args: argparse.Namespace, from_stage: bool) -> Options:
         width=args.width,
         height=args.height,
         samples=args.samples,
+        depth_of_field=_switch(args.depth_of_field),
+        motion_blur=_switch(args.motion_blur),
         integrator=args.integrator,
         aovs=args.aov,
         wavelength=args.wavelength,
         band=args.band,
         dispersion_scale=args.dispersion_scale,
-        motion_blur=False if args.no_motion_blur else None,
         seed=args.seed,
         threads=args.threads,
         crop=args.crop,
@@ -222,6 +241,10 @@ def request(args: argparse.Namespace, from_stage: bool) -> Options:
         options["camera"] = args.camera
         options["product"] = args.product
     return options
+
+
+def _switch(text: str | None) -> bool | None:
+    return None if text is None else text == "on"
 
 
 def is_scene_file(args: argparse.Namespace) -> bool:
@@ -252,16 +275,26 @@ def frame(args: argparse.Namespace) -> float | Literal["default"] | None:
     return time
 
 
-def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None) -> Scene:
-    """Load the stage, or the scene file, at a time code."""
+def keep_open(args: argparse.Namespace) -> Any:
+    """Return the stage to be opened once for several time codes."""
+    from ..usd import keep_open
+
+    return keep_open(args.stage)
+
+
+def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None, kept: Any = None) -> Scene:
+    """Load the stage, or the scene file, at a time code; ``kept`` is the stage kept open for several."""
     messages.show_warnings(getattr(args, "quiet", False))
+    if args.render_pass is not None and args.render_settings is not None:
+        raise UsageError("--render-pass: it says which settings it renders: leave --render-settings out")
     if not is_scene_file(args):
         try:
             return Scene.from_stage(
-                args.stage,
+                args.stage if kept is None else kept,
                 frame=time,
                 camera=args.camera,
                 render_settings=args.render_settings,
+                render_pass=args.render_pass,
                 product=args.product,
                 purposes=args.purposes,
                 variants=args.variant,
@@ -271,7 +304,7 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
                 mask=args.mask,
                 payloads=args.payloads,
                 missing=args.missing,
-                motion_blur=not getattr(args, "no_motion_blur", False),
+                motion_blur=_switch(getattr(args, "motion_blur", None)),
                 motion_vectors=asks_for_motion(args.aov) if hasattr(args, "aov") else True,
                 complexity=args.complexity,
                 scalar_ior=args.scalar_ior,
@@ -282,6 +315,7 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
     given = {
         "--frame, --frames, --defaultTime": time is not None,
         "--render-settings": args.render_settings is not None,
+        "--render-pass": args.render_pass is not None,
         "--purposes": args.purposes is not None,
         "--variant": bool(args.variant),
         "--set": bool(args.overrides),

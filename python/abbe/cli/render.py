@@ -15,6 +15,7 @@ from .._api import Options, Scene, counted
 from .._core import Film
 from .._files import replacing
 from ..errors import AbbeError, UsageError
+from ..frame_tokens import has_product_token
 from . import frames, messages, options
 from .progress import Reporter
 
@@ -31,8 +32,10 @@ def add(commands: Any) -> None:
         "out",
         nargs="?",
         metavar="OUT",
-        help="the .exr to write, instead of the stage's one product; #### is the frame",
+        help="the .exr to write, instead of the stage's one product; #### (or $F4, <F4>, %%04d) is the frame, and with "
+        "<OS> or <N>, a product's name or number, it names several products",
     )
+    parser.add_argument("--output", "-o", dest="out_option", metavar="OUT", help="the same as OUT")
     group = parser.add_argument_group("frames")
     group.add_argument(
         "--frames",
@@ -86,11 +89,15 @@ def _outputs(scene: Scene, args: argparse.Namespace, time: Time, request: Option
     """Return the file of each plan."""
     plans = scene.plans(**request)
     if args.out is not None:
-        if len(plans) > 1:
+        if len(plans) > 1 and not has_product_token(args.out):
             names = ", ".join(plan.product for plan in plans)
             raise UsageError(f"OUT {args.out}: the stage has {len(plans)} products: choose one with --product: {names}")
         stage_time = scene.document["stage"].get("time_code")
-        outputs = [frames.name_for(args.out, stage_time if time is None else time, "OUT")]
+        frame = stage_time if time is None else time
+        outputs = [
+            frames.name_for(args.out, frame, "OUT", plan.product.rpartition("/")[2], ordinal)
+            for ordinal, plan in enumerate(plans)
+        ]
     else:
         outputs = [plan.output for plan in plans]
         for plan in plans:
@@ -146,6 +153,10 @@ def _write_statistics(path: str, outcome: _Outcome) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     times = _times(args)
+    if args.out_option is not None:
+        if args.out is not None:
+            raise UsageError(f"--output {args.out_option}: OUT {args.out} is given too: give one of them")
+        args.out = args.out_option
     outcome = _Outcome()
     if args.out is not None:
         frames.need_placeholder(args.out, times, "OUT")
@@ -155,8 +166,10 @@ def run(args: argparse.Namespace) -> int:
     if args.stats is not None:
         _check_output(args.stats, "--stats", ".json")
     try:
+        # The stage stays open between frames.
+        kept = None if len(times) == 1 or options.is_scene_file(args) else options.keep_open(args)
         for time in times:
-            _render_frame(args, time, outcome)
+            _render_frame(args, time, outcome, kept)
     except (AbbeError, OSError) as error:
         # With some frames written and others not, the output is partial, whatever went wrong.
         if not outcome.files:
@@ -170,8 +183,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _render_frame(args: argparse.Namespace, time: Time, outcome: _Outcome) -> None:
-    scene = options.open_scene(args, time)
+def _render_frame(args: argparse.Namespace, time: Time, outcome: _Outcome, kept: Any) -> None:
+    scene = options.open_scene(args, time, kept)
     request = options.request(args, from_stage=not options.is_scene_file(args))
     outputs = _outputs(scene, args, time, request)
     for output in outputs:

@@ -31,7 +31,7 @@ def motion_span(
     time: Any,
     cameras: Sequence[dict[str, Any]],
     settings: dict[str, Any],
-    blur: bool,
+    blur: bool | None,
     vectors: bool | None,
 ) -> Span | None:
     """Return the interval in which motion is to be read; None for none.
@@ -40,7 +40,7 @@ def motion_span(
     ----------
     time : time code of the frame; nothing moves about default values, and what is read at the earliest time is at 0
     cameras, settings : of the description
-    blur : whether shutters count
+    blur : whether shutters count; where products do not disable it if None
     vectors : whether motion to the next frame is asked for; None if the render variables say so
     """
     base = settings.get("base")
@@ -49,7 +49,8 @@ def motion_span(
     for product in products:
         camera = cameras[product.get("camera", 0)]
         shutter = (camera.get("shutter_open", 0.0), camera.get("shutter_close", 0.0))
-        if blur and shutter[0] < shutter[1] and not product.get("disable_motion_blur", False):
+        is_wanted = not product.get("disable_motion_blur", False) if blur is None else blur
+        if is_wanted and shutter[0] < shutter[1]:
             marks.update(shutter)
     if vectors is None:
         sources = {var["source_name"] for product in products for var in product.get("vars", [])}

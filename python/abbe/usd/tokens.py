@@ -172,6 +172,14 @@ PRIMVAR_READER_TYPES: Final = {
 # Cameras.
 PERSPECTIVE: Final = "perspective"
 CAMERA: Final = "camera"
+# By name, because 24.8 has only the first: what the description calls each.
+EXPOSURE: Final = {
+    "exposure": "stops",
+    "exposure:time": "time",
+    "exposure:iso": "iso",
+    "exposure:fStop": "f_stop",
+    "exposure:responsivity": "responsivity",
+}
 
 # Render settings.
 RENDER_SETTINGS: Final = "RenderSettings"
@@ -198,6 +206,15 @@ COLOR3F: Final = "color3f"
 SOURCE_NAME: Final = "sourceName"
 SOURCE_TYPE: Final = "sourceType"
 RAW: Final = "raw"
+RENDER_PASS: Final = "RenderPass"
+RENDER_SOURCE: Final = "renderSource"
+INPUT_PASSES: Final = "inputPasses"
+COMMAND: Final = "command"
+FILE_NAME: Final = "fileName"
+PRUNE: Final = "prune"
+RENDER_VISIBILITY: Final = "renderVisibility"
+CAMERA_VISIBILITY: Final = "cameraVisibility"
+MATTE: Final = "matte"
 # Later ones win, so that RenderMan's spelling yields to the common one.
 DRIVER_NAMESPACES: Final = ("ri:driver:parameters", "driver:parameters")
 AOV_DRIVER_NAMESPACES: Final = ("ri:driver:parameters:aov", "driver:parameters:aov")
