@@ -112,8 +112,8 @@ def describe(
 def keep_open(path: str | os.PathLike[str]) -> Any:
     """Return a stage file to :func:`describe` at several frames: it is opened once, its layers are read once.
 
-    Everything but the frame has to be asked for in the same way each time. The stage is closed when what was returned is
-    no longer in use.
+    Everything but the frame has to be asked for in the same way each time. The stage is closed when what was returned
+    is no longer in use.
 
     Parameters
     ----------

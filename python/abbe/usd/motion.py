@@ -106,17 +106,20 @@ class MotionReader:
         at_frame = shapes.arrays[mesh["points"]]
         samples = _all_like(at_frame, (self._points_at(prim, time) for time in times))
         if samples is None:
-            self._diagnostics.warn(
-                "motion-of-changing-mesh",
-                place(prim),
-                "its number of points changes without velocities that follow it: it does not deform within the shutter",
-            )
             return
         # Extrapolated by velocities, the points at the frame may not be those authored before it.
         here = self._points_at(prim, 0.0)
         if here is not None and here.shape == at_frame.shape and not np.array_equal(here, at_frame):
             shapes.arrays[mesh["points"]] = here
         if all(np.array_equal(points, samples[0]) for points in samples):
+            # USD holds the points of a mesh that becomes another one.
+            counts = {len(attribute.Get(self._span.code(time)) or ()) for time in times}
+            if len(counts) > 1 and not follows_velocities:
+                self._diagnostics.warn(
+                    "motion-of-changing-mesh",
+                    place(prim),
+                    "its number of points changes without velocities that follow it: it does not deform in the shutter",
+                )
             return
         name = mesh["points"]
         motion: dict[str, Any] = {
