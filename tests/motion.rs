@@ -529,3 +529,21 @@ fn what_grows_from_nothing_is_there_as_soon_as_it_has_a_size() {
         assert_eq!(told["end"]["kind"], "surface", "{told}");
     }
 }
+
+#[test]
+fn boxes_hold_what_moves_at_all_times() {
+    // Trees decide nothing: every ray meets at its time what a look at every primitive finds.
+    let scene = story().stage(0.0, true).build();
+    let view = View::moving(&scene, Story::eye(0.0));
+    assert!(view.aggregate.is_moving());
+    let mut hits = 0;
+    for i in 0..4000u32 {
+        let part = |step: f64| (f64::from(i) * step).fract();
+        let direction = DVec3::new(part(0.618_034) - 0.5, part(0.414_214) - 0.5, -1.0).normalize();
+        let ray = abbe::geometry::Ray { origin: DVec3::ZERO, direction, time: 1.2 * part(0.324_718) - 0.6 };
+        let found = view.aggregate.intersect(&ray, &abbe::geometry::Departures::none());
+        assert_eq!(found, view.aggregate.intersect_without_tree(&ray), "{ray:?}");
+        hits += usize::from(found.is_some());
+    }
+    assert!(hits > 3000, "{hits}");
+}
