@@ -72,6 +72,7 @@ class Options(TypedDict, total=False):
     motion_blur: bool | None
     seed: int | None
     threads: int | None
+    texture_memory: int | None
     crop: tuple[int, int, int, int] | None
     sample_range: tuple[int, int] | None
     strict: bool
@@ -189,7 +190,7 @@ class Scene:
         session_layer : a layer stronger than all of the stage, which is not changed
         mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
         payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
-        missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+        missing : what to do where a layer, prim or texture that is referred to is missing: ``"warn"`` or ``"error"``
         motion_blur : whether to read motion while shutters are open; as the stage's products say if None
         motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
         complexity : ``"low"``, ``"medium"``, ``"high"``, ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
@@ -259,19 +260,20 @@ class Scene:
         """
         return cls(_core.Scene.load(Path(path), mapped=mapped))
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str], *, embed: bool = False) -> None:
         """Write the scene to a file for :meth:`load` and the program ``abbe-render``.
 
         Parameters
         ----------
         path : where to; complete or not at all
+        embed : put what is in the image files into it; else it names them by their absolute paths
 
         Raises
         ------
         AbbeError
             It cannot be written.
         """
-        self._core.save(Path(path))
+        self._core.save(Path(path), embed=embed)
 
     def __repr__(self) -> str:
         document = self.document
@@ -320,6 +322,28 @@ class Scene:
             An option contradicts the scene or another option.
         """
         return [Plan(text, json.loads(fields)) for text, fields in self._core.plan(_request(options))]
+
+    def lights(self) -> list[dict[str, Any]]:
+        """Tell what shines: every light as an integrator that uses lights has it.
+
+        Files of lights are read for it; what is odd about them is logged as a warning.
+
+        Returns
+        -------
+        list of dict
+            ``path``, ``kind``, ``position`` and ``direction`` in the stage's world, ``area``, ``emission`` (linear
+            Rec. 709 by luminance), ``spectrum``, ``power``, ``shaped``, ``texture``, ``group``, and the collections
+            ``illuminates`` and ``shadowed_by``; None for what a light does not have or restrict.
+
+        Raises
+        ------
+        AbbeError
+            A file of a light cannot be read and missing files are errors.
+        """
+        lights, warnings = self._core.lights()
+        for warning in warnings:
+            _log.warning("%s", warning_text(warning))
+        return lights
 
     def trace(self, pixel: tuple[int, int], sample: int = 0, **options: Unpack[Options]) -> dict[str, Any]:
         """Follow one sample and tell every event of its chain.
@@ -442,6 +466,7 @@ def render(
     motion_blur: bool | None = None,
     seed: int | None = None,
     threads: int | None = None,
+    texture_memory: int | None = None,
     crop: tuple[int, int, int, int] | None = None,
     sample_range: tuple[int, int] | None = None,
     purposes: Sequence[str] | None = None,
@@ -481,6 +506,7 @@ def render(
     motion_blur : whether samples are spread over the time that the shutter is open
     seed : same seed, same bits, on any number of threads
     threads : all of the machine's if None
+    texture_memory : for the texels of images, MB, 4294 if None; what does not fit goes to a temporary file
     crop : x0, y0, x1, y1 in pixels, half-open, y down
     sample_range : begin and end, half-open: a part that :func:`merge` joins with others
     purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, complexity, scalar_ior : as for
@@ -541,6 +567,7 @@ def render(
         motion_blur=motion_blur,
         seed=seed,
         threads=threads,
+        texture_memory=texture_memory,
         crop=crop,
         sample_range=sample_range,
         strict=strict,

@@ -11,6 +11,7 @@ use abbe::Error;
 use abbe::integrator::Registry;
 use abbe::render::{self, Control, Plan, Progress, Rendered, Request};
 use abbe::scene::description::Description;
+use abbe::scene::lights::Summary;
 use abbe::scene::{Scene, file};
 use numpy::PyUntypedArray;
 use pyo3::prelude::*;
@@ -69,9 +70,13 @@ impl PyScene {
         released(py, || Self::build(file::read(&path, mapped)?))
     }
 
-    /// Writes the scene as a file, complete or not at all.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> Outcome<()> {
-        released(py, || Ok(file::write(&path, self.scene.description())?))
+    /// Writes the scene as a file, complete or not at all; `embed` puts what is in its image files into it.
+    #[pyo3(signature = (path, *, embed = false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, embed: bool) -> Outcome<()> {
+        released(py, || {
+            let description = self.scene.description();
+            Ok(if embed { file::write(&path, &file::embedded(description))? } else { file::write(&path, description)? })
+        })
     }
 
     /// The scene description's document, as JSON.
@@ -92,6 +97,16 @@ impl PyScene {
             };
             Ok(self.plans(request)?.iter().map(as_pair).collect())
         })
+    }
+
+    /// The lights as integrators that use them have them, and what was odd about them: (lights, warnings).
+    fn lights<'py>(&self, py: Python<'py>) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (lights, summaries) = released(py, || {
+            let lights = self.scene.lights()?;
+            let summaries = Summary::all(&self.scene, &lights);
+            Ok((lights, summaries))
+        })?;
+        Ok((json::to_python(py, &summaries)?, json::to_python(py, &lights.diagnostics)?))
     }
 
     /// Every event of one sample's chain, with its columns.

@@ -92,6 +92,8 @@ impl Aov {
 const XYZ: &[&str] = &["X", "Y", "Z"];
 const XY: &[&str] = &["X", "Y"];
 const UV: &[&str] = &["U", "V"];
+/// A colour: the one thing that is R, G, B.
+const RGB: &[&str] = &["R", "G", "B"];
 const X: &[&str] = &["X"];
 const Z: &[&str] = &["Z"];
 const I: &[&str] = &["I"];
@@ -117,6 +119,11 @@ pub const INTERNAL_TRANSMITTANCE: &str = "internal_transmittance";
 pub const MOTION: &str = "motion";
 /// Motion on screen of what is seen through glass, which is traced again at the frame and at the next one.
 pub const REFRACTED_MOTION: &str = "refracted_motion";
+
+/// Whether an AOV is that of a surface's color.
+pub fn is_albedo(aov: &Aov) -> bool {
+    matches!(aov.name, "albedo" | "refracted_albedo")
+}
 
 /// Every AOV of the geometric and differential passes.
 pub static AOVS: &[Aov] = &[
@@ -239,6 +246,13 @@ pub static AOVS: &[Aov] = &[
         "the same of the chain's end as it is seen through the glass, both of which may move; absent where the next frame does not show it through as many interfaces",
     ),
     mean(
+        "albedo",
+        RGB,
+        "1",
+        Family::FirstSurface,
+        "what denoisers expect of the first surface, linear Rec. 709: base color of what is diffuse, reflectance at normal incidence of a metal, tint of what transmits (1 for clear glass), displayColor where there is no material",
+    ),
+    mean(
         "refracted_depth",
         Z,
         "stage unit",
@@ -267,6 +281,7 @@ pub static AOVS: &[Aov] = &[
         "unit geometric normal at the chain's end, world space, outward as authored",
     ),
     mean("refracted_uv", UV, "1", Family::Chain, "texture coordinates at the chain's end"),
+    mean("refracted_albedo", RGB, "1", Family::Chain, "albedo at the chain's end: of what is seen through the glass"),
     first(
         "prim_id",
         "index",
@@ -305,6 +320,7 @@ pub static ALIASES: &[(&str, &str)] = &[
     ("Ng", "normal_geometric"),
     ("st", "uv"),
     ("motionvector", MOTION),
+    ("Albedo", "albedo"),
     ("Ci", "color"),
     ("C", "color"),
     ("RGBA", "color"),

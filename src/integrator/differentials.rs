@@ -72,6 +72,7 @@ enum SurfaceValue {
     NormalGeometric,
     Uv,
     Motion,
+    Albedo,
     PrimId,
     InstanceId,
     MaterialId,
@@ -113,6 +114,7 @@ impl Output {
             "uv" => SurfaceValue::Uv,
             MOTION if whose == Whose::First => SurfaceValue::Motion,
             MOTION => return Self::SeenMotion,
+            "albedo" => SurfaceValue::Albedo,
             "prim_id" => SurfaceValue::PrimId,
             "instance_id" => SurfaceValue::InstanceId,
             "material_id" => SurfaceValue::MaterialId,
@@ -317,6 +319,10 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
                 out.add(layer, uv);
             }
             SurfaceValue::Motion => out.add(layer, screen_motion::of_surface(task, arriving, met)),
+            SurfaceValue::Albedo => {
+                self.counters.albedo_lookups += u64::from(met.is_some());
+                out.add(layer, met.map(|met| view.albedo(&met.hit, met.material_id)));
+            }
             SurfaceValue::PrimId => out.add_first(layer, object.map_or(0, |o| o.prim_id)),
             SurfaceValue::InstanceId => out.add_first(layer, object.map_or(0, |o| o.instance_id)),
             SurfaceValue::MaterialId => out.add_first(layer, met.map_or(0, |met| met.material_id)),

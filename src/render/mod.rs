@@ -11,6 +11,7 @@ pub mod plan;
 pub mod request;
 mod settings;
 mod shot;
+mod textures;
 pub mod trace;
 mod validity;
 
@@ -38,6 +39,7 @@ use crate::integrator::{Registry, Task};
 use crate::sampler::Sampler;
 use crate::scene::view::View;
 use crate::scene::{Counts, Scene};
+use crate::texture::TextureCounts;
 
 /// Side of a tile, pixels: small enough to share the work evenly, large enough to forget its administration.
 const TILE: i32 = 16;
@@ -87,6 +89,8 @@ pub struct Statistics {
     pub plan: Plan,
     /// Sizes of the scene.
     pub scene: Counts,
+    /// Images of the scene: named, read, kept.
+    pub textures: TextureCounts,
     /// What tracing cost.
     pub counters: Counters,
     /// Values that were not finite and became absent.
@@ -148,6 +152,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
     let integrator = registry.find(&plan.integrator)?;
     let camera = camera(scene, plan)?;
     let view = view(scene, plan, &camera);
+    textures::prepare(scene, &plan.needs, plan.texture_memory)?;
     let aovs: Vec<&'static Aov> = plan.layers.iter().map(|layer| layer.aov).collect();
     let task = Task {
         view: &view,
@@ -172,7 +177,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
     tiles.par_iter().for_each_init(
         || (prepared.worker(), PixelAccumulator::new(aovs.iter().copied(), plan.samples), Counters::default(), 0),
         |(worker, pixel, counted, non_finite_counted), &tile| {
-            if control.cancel.load(Ordering::Relaxed) {
+            if control.cancel.load(Ordering::Relaxed) || textures::has_failed(scene) {
                 return;
             }
             let keep_sums = !plan.samples.is_all();
@@ -207,6 +212,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
 
     let mut warnings = scene.diagnostics().clone();
     warnings.extend(&plan.diagnostics);
+    textures::report_unreadable(scene, &mut warnings)?;
     if counters.unmatched_exits > 0 {
         warnings.warn(
             "unmatched-exits",
@@ -259,6 +265,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
         pixels,
         plan: plan.clone(),
         scene: scene.counts,
+        textures: scene.textures.counts(),
         counters,
         non_finite_values,
         warnings,

@@ -12,6 +12,7 @@ use super::motion::motion_plan;
 use super::request::Request;
 use super::settings::{self, Attributes};
 use super::shot::{DepthOfField, Shot};
+use super::textures;
 use super::validity;
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
@@ -23,9 +24,9 @@ use crate::geometry::Shape;
 use crate::integrator::transmittance::absorbs;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
 use crate::optics::dispersion::Dispersion;
-use crate::scene::Scene;
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
+use crate::scene::{Scene, lights};
 use crate::spectrum::{Wavelength, lines};
 
 /// A decision with its reason.
@@ -102,6 +103,8 @@ pub struct Plan {
     pub seed: u64,
     /// Threads, 0 for all.
     pub threads: usize,
+    /// Memory for the texels of images, bytes.
+    pub texture_memory: u64,
     /// Name of the integrator.
     pub integrator: String,
     /// Layers in the film's order.
@@ -175,6 +178,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     };
     let driver = product.map(|p| Driver::new(p, &mut diagnostics)).unwrap_or_default();
     attributes.warn_of_unused(&mut diagnostics);
+    textures::report_missing(scene, &needs, &mut diagnostics);
     if request.strict {
         refuse_warnings(&[scene.diagnostics(), &diagnostics])?;
     }
@@ -195,6 +199,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         samples,
         seed,
         threads: settings::threads(request)?,
+        texture_memory: textures::memory(request)?,
         integrator: integrator.name().to_owned(),
         layers,
         optics,
@@ -318,11 +323,16 @@ fn reasons(
             None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
         }
     }
-    note(
-        false,
-        "light sampling, emission, textures",
-        format!("the integrator '{}' has no use for them", integrator.name()),
-    );
+    let unused = format!("the integrator '{}' has no use for them", integrator.name());
+    let kinds: Vec<_> =
+        lights::kinds(scene.document()).into_iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+    if kinds.is_empty() {
+        note(false, "light sampling, emission", unused);
+    } else {
+        note(false, &format!("lights ({})", kinds.join(", ")), unused.clone());
+        note(false, "emission", unused);
+    }
+    textures::decide(scene, layers, needs, &mut note);
     if scene.objects.hides_some() {
         note(
             true,

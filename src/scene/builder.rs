@@ -9,8 +9,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::description::{self, Array, Description, Document, Element, Placement};
+use super::lights;
+use super::links::{self, Links};
 use super::manifest::Manifest;
-use super::material::{self, Context, Material, ScalarIor};
+use super::material::{self, Context, Material, Resources, ScalarIor};
 use super::meshes;
 use super::objects::{Appearance, ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
 use super::solids;
@@ -29,13 +31,17 @@ pub fn build(description: Description) -> Result<Scene> {
     let mut diagnostics = document.warnings.clone();
     check_stage(document)?;
     unroll::check_groups(&description)?;
+    links::check(&description)?;
+    lights::check(&description, &mut diagnostics)?;
     let Unrolled { singles, prototypes, arrays, mut instances } = unroll::unroll(&description, &mut diagnostics)?;
 
     let placed = || singles.iter().chain(prototypes.iter().flatten());
     let mut used = vec![false; document.shapes.len()];
     placed().for_each(|p| used[p.shape] = true);
-    let (materials, material_ids) = build_materials(document, placed(), &mut diagnostics)?;
-    let primvars = Vec::new();
+    let mut resources = Resources::new(&description);
+    let (materials, material_ids) = build_materials(document, placed(), &mut resources, &mut diagnostics)?;
+    let display_color = material::display_color(&mut resources);
+    let Resources { store: textures, primvars, .. } = resources;
     let shapes = build_shapes(&description, &used, &primvars, &mut diagnostics)?;
 
     let mut compiler = Compiler {
@@ -47,6 +53,7 @@ pub fn build(description: Description) -> Result<Scene> {
         seen: vec![false; shapes.len()],
         triangles: 0,
     };
+    let mut links = Links::new(&description);
     let mut objects = Vec::with_capacity(singles.len());
     for single in &singles {
         let Some((shape, PartIds { prim_id, material_ids, appearance, .. })) =
@@ -60,23 +67,25 @@ pub fn build(description: Description) -> Result<Scene> {
         };
         let primvars = constants(single.placement, &primvars)?;
         let world_from_object = single.transform.clone();
+        links.push(single.placement);
         objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars, appearance });
     }
     let prototypes = prototypes
         .iter()
         .map(|placed| {
-            let (mut parts, mut ids) = (Vec::new(), Vec::new());
+            let (mut parts, mut ids, mut placements) = (Vec::new(), Vec::new(), Vec::new());
             for part in placed {
                 let Some((shape, part_ids)) = compiler.part(part, &mut diagnostics)? else { continue };
                 let part_ids = PartIds { primvars: constants(part.placement, &primvars)?, ..part_ids };
                 parts.push(Part { shape, place_from_object: part.transform.clone() });
                 ids.push(part_ids);
+                placements.push(part.placement);
             }
-            Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids)))
+            Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids), placements))
         })
         .collect::<Result<Vec<_>>>()?;
     let arrays = arrays.into_iter().filter_map(|array| {
-        let (parts, ids) = &prototypes[array.prototype];
+        let (parts, ids, placements) = &prototypes[array.prototype];
         let instances = InstanceArray {
             parts: Arc::clone(parts),
             places: array.places,
@@ -85,7 +94,11 @@ pub fn build(description: Description) -> Result<Scene> {
         };
         let parts = Arc::clone(ids);
         let placed = ObjectArray { instances, parts, first_id: array.first_id, indices: array.indices };
-        (!placed.instances.is_empty()).then_some(placed)
+        let has_places = !placed.instances.is_empty();
+        if has_places {
+            links.push_array(placements.iter().copied(), array.link_sets);
+        }
+        has_places.then_some(placed)
     });
     let objects = Objects::new(objects, arrays.collect());
     let Compiler { prims, seen, triangles, .. } = compiler;
@@ -96,7 +109,20 @@ pub fn build(description: Description) -> Result<Scene> {
         materials: materials.len() as u64,
     };
     let skipped = document.skipped.clone();
-    Ok(Scene { objects, materials, prims, instances, skipped, counts, diagnostics, description })
+    let textures = Arc::new(textures);
+    Ok(Scene {
+        objects,
+        links,
+        materials,
+        textures,
+        display_color,
+        prims,
+        instances,
+        skipped,
+        counts,
+        diagnostics,
+        description,
+    })
 }
 
 fn too_many(path: &str) -> Error {
@@ -357,6 +383,11 @@ impl<'a> NamedArrays<'a> {
         self.share(name, Element::F64, columns)
     }
 
+    /// What is in an array of bytes.
+    pub(super) fn bytes(&self, name: &str) -> Result<&'a [u8]> {
+        Ok(&self.get(name, Element::U8, 1)?.bytes)
+    }
+
     /// Shares the memory of an array of integers.
     pub(super) fn indices(&self, name: &str) -> Result<Buffer<i32>> {
         self.share(name, Element::I32, 1)
@@ -436,6 +467,7 @@ impl<'a> NamedArrays<'a> {
 fn build_materials<'a>(
     document: &Document,
     placed: impl Iterator<Item = &'a Placed<'a>>,
+    resources: &mut Resources<'_>,
     diagnostics: &mut Diagnostics,
 ) -> Result<(Vec<Material>, Vec<u32>)> {
     let mut used = vec![false; document.materials.len()];
@@ -450,7 +482,7 @@ fn build_materials<'a>(
     let context = Context { scalar_ior: scalar_ior(document)?, meters_per_unit: document.stage.meters_per_unit };
     for (i, authored) in document.materials.iter().enumerate() {
         if used[i] {
-            materials.push(material::compile(authored, &context, diagnostics)?);
+            materials.push(material::compile(authored, &context, resources, diagnostics)?);
             ids[i] = materials.len() as u32;
         }
     }

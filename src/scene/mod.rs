@@ -6,6 +6,8 @@
 pub mod builder;
 pub mod description;
 pub mod file;
+pub mod lights;
+mod links;
 mod manifest;
 pub mod material;
 mod meshes;
@@ -15,10 +17,13 @@ mod unroll;
 pub mod view;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
+use crate::texture::{Program, Store};
 use description::{Description, Document};
+use links::Links;
 pub use manifest::Manifest;
 use material::Material;
 pub use objects::{Appearance, ConstantPrimvars, Object, ObjectArray, ObjectIds, Objects, PartIds};
@@ -28,8 +33,13 @@ pub use objects::{Appearance, ConstantPrimvars, Object, ObjectArray, ObjectIds, 
 pub struct Scene {
     /// Placed shapes in the order of the description.
     pub objects: Objects,
+    links: Links,
     /// Materials bound to some object, in the order of the description.
     pub materials: Vec<Material>,
+    /// Images that materials name.
+    pub textures: Arc<Store>,
+    /// The albedo of what has no material: the primvar `displayColor`.
+    pub display_color: Program,
     /// Prim paths behind `prim_id`.
     pub prims: Manifest,
     /// Instance paths behind `instance_id`.
@@ -61,6 +71,17 @@ impl Scene {
     /// Errors name the prim concerned; oddities that were repaired stand in [`diagnostics`](Self::diagnostics).
     pub fn build(description: Description) -> Result<Self> {
         builder::build(description)
+    }
+
+    /// The lights, compiled now: their files are read. Only integrators that use lights ask.
+    pub fn lights(&self) -> Result<lights::Lights> {
+        lights::compile(self)
+    }
+
+    /// Whether an object is in a link set: what [`Light::illuminates`](crate::light::Light::illuminates) and
+    /// [`Light::shadowed_by`](crate::light::Light::shadowed_by) refer to.
+    pub fn is_linked(&self, set: u32, object: u32) -> bool {
+        self.links.contains(set, self.objects.location(object))
     }
 
     /// What the bridge and the builder had to say.

@@ -20,6 +20,11 @@ def add(commands: Any) -> None:
     group.add_argument("--product", metavar="P", help="path of the one RenderProduct to keep")
     options.add_scalar_ior(group)
     group.add_argument("--strict", action="store_true", help="a stage without a camera is an error")
+    group.add_argument(
+        "--embed",
+        action="store_true",
+        help="put what is in the texture files into the scene",
+    )
     options.add_quiet(parser)
     parser.set_defaults(run=run)
 
@@ -28,5 +33,5 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     if Path(args.out).suffix != options.SCENE_SUFFIX:
         raise UsageError(f"{args.out}: must end with {options.SCENE_SUFFIX}")
-    options.open_scene(args, options.frame(args)).save(args.out)
+    options.open_scene(args, options.frame(args)).save(args.out, embed=args.embed)
     return 0

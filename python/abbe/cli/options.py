@@ -130,7 +130,7 @@ def add_stage(parser: argparse.ArgumentParser, time: bool = True, scene_file: bo
         "--missing",
         choices=("warn", "error"),
         default="warn",
-        help="what a missing layer or reference is; warn unless given",
+        help="what a missing layer, reference or texture is; warn unless given",
     )
     group.add_argument(
         "--complexity",
@@ -204,6 +204,12 @@ def add_request(parser: argparse.ArgumentParser) -> None:
         "--threads", type=int, metavar="N", help="all of the machine's unless given; never changes a bit"
     )
     group.add_argument(
+        "--texture-memory",
+        type=int,
+        metavar="MB",
+        help="for texels, 4294 unless given; what does not fit goes to a temporary file; never changes a bit",
+    )
+    group.add_argument(
         "--crop",
         type=numbers(int, 4, "X0,Y0,X1,Y1"),
         metavar="X0,Y0,X1,Y1",
@@ -233,6 +239,7 @@ def request(args: argparse.Namespace, from_stage: bool) -> Options:
         dispersion_scale=args.dispersion_scale,
         seed=args.seed,
         threads=args.threads,
+        texture_memory=args.texture_memory,
         crop=args.crop,
         sample_range=args.sample_range,
         strict=args.strict,

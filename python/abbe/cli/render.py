@@ -47,6 +47,9 @@ def add(commands: Any) -> None:
         "--defaultTime", "-d", dest="default_time", action="store_true", help="read default values, not time samples"
     )
     options.add_request(parser)
+    group = parser.add_argument_group("accepted from scripts that call usdrecord")
+    group.add_argument("--disableGpu", action="store_true", help="there is no other way: abbe renders on the CPU")
+    group.add_argument("--disableCameraLight", action="store_true", help="there is no such light")
     group = parser.add_argument_group("reports")
     group.add_argument("--stats", metavar="FILE.json", help="write what was counted, chosen and warned of")
     group.add_argument("--preview", metavar="FILE.png", help="write a picture of the layers in false colour")

@@ -58,7 +58,7 @@ def describe(
     session_layer : a layer stronger than all of the stage, which is not changed
     mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
     payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
-    missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+    missing : what to do where a layer, prim or texture that is referred to is missing: ``"warn"`` or ``"error"``
     motion_blur : whether to read motion while shutters are open; as the stage's products say if None
     motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
     complexity : ``"low"``, ``"medium"``, ``"high"`` or ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;

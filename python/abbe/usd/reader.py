@@ -24,11 +24,14 @@ from .description import Array, ArrayTable, BrokenError, Description, Diagnostic
 from .geometry import ShapeReader
 from .instancers import InstancerReader
 from .lenses import is_lens
+from .lights import LightReader, is_light
+from .links import link_lights
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
 from .motion import MotionReader, motion_span
-from .passes import Appearance, RenderPass, find_pass
+from .passes import ActivePass, Appearance, find_pass
 from .places import Places
+from .primvars import PrimvarReader
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import KeptStage, OpenedStage, Opening, open_stage, source_name
@@ -58,6 +61,9 @@ class _Kind(enum.Enum):
     LEAF = enum.auto()
 
 
+_GEOMETRY = (_Kind.MESH, _Kind.SPHERE, _Kind.SOLID, _Kind.LENS)
+
+
 def _classify(prim: Any) -> _Kind:
     """Return what to do with prims of this one's type; LEAF where nothing below can be rendered."""
     if prim.IsA(UsdGeom.Mesh):
@@ -68,8 +74,11 @@ def _classify(prim: Any) -> _Kind:
         return _Kind.SOLID
     if prim.IsA(UsdGeom.Camera):
         return _Kind.CAMERA
-    if prim.HasAPI(UsdLux.LightAPI) or any(prim.IsA(base) for base in _light_schemas()):
+    if prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase):
         return _Kind.LIGHT
+    if prim.IsA(UsdLux.LightFilter):
+        # Of those that a light asks for, the light's reader speaks.
+        return _Kind.LEAF
     if prim.IsA(UsdGeom.PointInstancer):
         return _Kind.INSTANCER
     if prim.GetTypeName() in ("SkelRoot", "Skeleton"):
@@ -83,11 +92,6 @@ def _classify(prim: Any) -> _Kind:
     return _Kind.PASS_THROUGH
 
 
-def _light_schemas() -> list[Any]:
-    names = ("BoundableLightBase", "NonboundableLightBase", "LightFilter")
-    return [getattr(UsdLux, name) for name in names if hasattr(UsdLux, name)]
-
-
 class _Facts(NamedTuple):
     """What a prim says of itself; the same for a prim of a prototype under every instance."""
 
@@ -95,6 +99,8 @@ class _Facts(NamedTuple):
     invisible: bool
     purpose: str | None
     """None where none is authored."""
+    shines: bool
+    """It is a light by type, or geometry that is one too."""
 
 
 class _State(NamedTuple):
@@ -116,6 +122,14 @@ class _Placed(NamedTuple):
     item: dict[str, Any]
 
 
+class _Light(NamedTuple):
+    """A light on its way into the description."""
+
+    prim: Any
+    transform: list[float] | None
+    """None where it is placed as a shape."""
+
+
 @dataclass
 class _Group:
     """What is placed together: the stage, or a prototype of point instancers."""
@@ -127,6 +141,7 @@ class _Group:
     instances: list[dict[str, Any]] = field(default_factory=list)
     instancers: list[tuple[Any, Any]] = field(default_factory=list)
     """The prims that these are of, and what they share with other native instances."""
+    lights: list[_Light] = field(default_factory=list)
 
 
 # Deeper nesting of instancers than this nobody models, and Python's own stack would end soon after.
@@ -141,7 +156,7 @@ class _Walk:
         opened: OpenedStage,
         time: Any,
         purposes: frozenset[str],
-        render_pass: RenderPass | None,
+        render_pass: ActivePass | None,
         level: int | None,
         diagnostics: Diagnostics,
     ) -> None:
@@ -206,7 +221,7 @@ class _Walk:
                 if kind is _Kind.INSTANCER:
                     self._instance(prim, source or prim, str(path), state, group)
                 elif kind is not _Kind.PASS_THROUGH:
-                    self._visit(prim, source or prim, str(path), kind, state, group)
+                    self._visit(prim, source or prim, str(path), facts, state, group)
                 elif prim.IsModel():
                     self._check_draw_mode(prim, state)
             except BrokenError as broken:
@@ -225,7 +240,10 @@ class _Walk:
 
         def has_something(root: Any) -> bool:
             index = self._prototype(root, prim, state)
-            return index is not None and bool(self.groups[index].placed or self.groups[index].instances)
+            if index is None:
+                return False
+            group = self.groups[index]
+            return bool(group.placed or group.instances or group.lights)
 
         transform = self._transform(prim, group)
         for elements in self.instancers.elements(prim, source, has_something):
@@ -292,12 +310,16 @@ class _Walk:
             kind = self._kinds[type_name] = _classify(prim)
         if kind in (_Kind.MESH, _Kind.PASS_THROUGH) and is_lens(prim):
             kind = _Kind.LENS
+        shines = kind is _Kind.LIGHT or is_light(prim)
+        if shines and kind is _Kind.PASS_THROUGH:
+            kind = _Kind.LIGHT
         attribute = prim.GetAttribute(tokens.PURPOSE)
         authored = bool(attribute) and attribute.HasAuthoredValue()
         return _Facts(
             kind,
             read(prim, tokens.VISIBILITY, self.time) == tokens.INVISIBLE,
             str(read(prim, tokens.PURPOSE, self.time) or tokens.DEFAULT) if authored else None,
+            shines,
         )
 
     @staticmethod
@@ -326,16 +348,14 @@ class _Walk:
         own = self._pass.appearance(prim.GetPath())
         return Appearance(own.hidden or state.appearance.hidden, own.matte or state.appearance.matte)
 
-    def _visit(self, prim: Any, source: Any, path: str, kind: _Kind, state: _State, group: _Group) -> None:
+    def _visit(self, prim: Any, source: Any, path: str, facts: _Facts, state: _State, group: _Group) -> None:
         """Do with a prim what its kind asks for; ``source`` is what it shares with other instances, or itself."""
+        kind = facts.kind
         if kind is _Kind.CAMERA:
             if group.root is None:
                 self.cameras.append(prim)
             return
         if not self._is_rendered(prim):
-            return
-        if kind is _Kind.LIGHT:
-            self.diagnostics.skip("lights: not asked for")
             return
         if not state.visible:
             self.diagnostics.skip("invisible")
@@ -346,6 +366,10 @@ class _Walk:
             return
         if purpose != tokens.DEFAULT and self._hides(prim, purpose):
             self.diagnostics.skip("invisible")
+            return
+        if facts.shines:
+            group.lights.append(_Light(prim, None if kind in _GEOMETRY else self._transform(prim, group)))
+        if kind is _Kind.LIGHT:
             return
         if kind is _Kind.MESH:
             self._place(prim, path, self.shapes.mesh(prim, source), state, group)
@@ -427,6 +451,7 @@ class _Walk:
             prims.append(placed.prim)
             prims.extend(placed.prim.GetChild(name) for name in self.shapes.subset_names[placed.shape])
         bound = iter(materials.bound(prims))
+        primvars = PrimvarReader(self.shapes, self.time, self.diagnostics)
         for placed in placements:
             material = next(bound)
             if material is not None:
@@ -434,6 +459,11 @@ class _Walk:
             names = self.shapes.subset_names[placed.shape]
             if names:
                 placed.item["subset_materials"] = [next(bound) for _ in names]
+            used = {material, *placed.item.get("subset_materials", ())}
+            looked_up = {name for index in used if index is not None for name in materials.primvars[index]}
+            if None in used:
+                looked_up.add(tokens.DISPLAY_COLOR)
+            primvars.add(placed.prim, placed.shape, looked_up, placed.item)
         groups: list[dict[str, Any]] = []
         for group in self.groups:
             groups.append({"path": group.path, "items": [placed.item for placed in group.placed]})
@@ -457,6 +487,24 @@ class _Walk:
                 _add(item, "places_motion", places[source].get(item["transforms"]))
         for prim, camera in cameras:
             _add(camera, "motion", reader.transform(prim))
+
+    def shine(self, reader: LightReader, groups: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Add lights to the groups, which are bound, and return the sets that they are linked to."""
+        lights = []
+        for group, described in zip(self.groups, groups, strict=True):
+            for prim, transform in group.lights:
+                try:
+                    light = reader.read(prim, is_geometry=transform is None)
+                except BrokenError as broken:
+                    self.diagnostics.leave_out(broken)
+                    continue
+                if light is None:
+                    continue
+                if transform is not None and transform != IDENTITY:
+                    light["transform"] = transform
+                described.setdefault("lights", []).append(light)
+                lights.append((light, prim))
+        return link_lights(groups, lights, self.diagnostics)
 
     def arrays(self) -> dict[str, Array]:
         """Return all arrays by name."""
@@ -589,8 +637,10 @@ def _read(
     walk = _Walk(opened, time, shown, active_pass, refinement_level(complexity), diagnostics)
     walk.run()
     assets = AssetReader(stage, time)
-    materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim))
+    materials = MaterialReader(time, diagnostics, _binding_purposes(settings_prim), assets)
     groups = walk.bind(materials)
+    metadata = stage_metadata(opened, time_code, diagnostics)
+    link_sets = walk.shine(LightReader(time, metadata["up_axis"], assets, diagnostics), groups)
 
     cameras: list[dict[str, Any]] = []
     index_by_camera: dict[Any, int] = {}
@@ -601,7 +651,6 @@ def _read(
             cameras.append(read_camera(prim, time, walk.places.cache))
         return index_by_camera[prim]
 
-    metadata = stage_metadata(opened, time_code, diagnostics)
     chosen = find_camera(stage, camera, source) if camera else default_camera(stage, settings_prim, walk.cameras)
     if chosen is not None:
         camera_index(chosen)
@@ -627,6 +676,7 @@ def _read(
         "materials": materials.materials,
         "textures": assets.textures,
         "cameras": cameras,
+        "link_sets": link_sets,
         "settings": settings,
         "warnings": diagnostics.warnings(),
         "skipped": diagnostics.skipped,
@@ -648,12 +698,10 @@ def _purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[str]:
     return frozenset([tokens.DEFAULT, *wanted])
 
 
-def _binding_purpose(settings: Any) -> str:
-    """Return the material purpose: the first of the settings' that is not the all-purpose one."""
+def _binding_purposes(settings: Any) -> Sequence[str]:
+    """Return the material purposes in the order in which they count: the settings', else full and all-purpose."""
     authored = None if settings is None else token_list(settings, tokens.MATERIAL_BINDING_PURPOSES)
-    if authored is None:
-        return tokens.FULL_PURPOSE
-    return next(filter(None, authored), str(UsdShade.Tokens.allPurpose))
+    return tokens.BINDING_PURPOSES if authored is None else authored
 
 
 def default_camera(stage: Any, settings: Any, cameras: list[Any]) -> Any:

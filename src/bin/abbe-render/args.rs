@@ -28,6 +28,7 @@ What is not given, the scene's render settings decide.
   --dispersion-scale S     multiplies all dispersion: 0 none, 1 physical
   --seed N                 same seed, same bits
   --threads N              all of the machine's unless given; never changes a bit
+  --texture-memory MB      for the texels of images, 4294 unless given; never changes a bit
   --crop X0,Y0,X1,Y1       pixels to render, half-open, y down
   --sample-range A:B       samples to render, half-open; `abbe merge` joins parts
   --strict                 any warning is an error, and nothing is written
@@ -92,6 +93,7 @@ fn read(mut parser: lexopt::Parser) -> Result<Command> {
             "band" => request.band = Some(numbers(&mut parser, &option, ':', "LO:HI")?),
             "dispersion-scale" => request.dispersion_scale = Some(number(&mut parser, &option)?),
             "seed" => request.seed = Some(number(&mut parser, &option)?),
+            "texture-memory" => request.texture_memory = Some(number(&mut parser, &option)?),
             "threads" => request.threads = Some(number(&mut parser, &option)?),
             "crop" => request.crop = Some(numbers(&mut parser, &option, ',', "X0,Y0,X1,Y1")?),
             "sample-range" => request.sample_range = Some(numbers(&mut parser, &option, ':', "A:B")?),
