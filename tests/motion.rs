@@ -119,6 +119,7 @@ impl Story {
             path: "/Prototypes".into(),
             items: vec![part],
             instances: vec![],
+            lights: vec![],
         });
         let mut instances = Instances {
             path: "/World/Cubes".into(),
@@ -129,6 +130,7 @@ impl Story {
             count: 2,
             motion: None,
             places_motion: None,
+            link_sets: Default::default(),
         };
         s.camera(DVec3::ZERO, DVec3::NEG_Z);
         s.document.cameras[0].transform = now(Self::look).to_cols_array();
@@ -500,6 +502,7 @@ fn motion_nested_without_end_is_refused() {
             path: format!("/G{depth}"),
             items,
             instances: vec![],
+            lights: vec![],
         });
         let mut item = support::ball().document.groups[0].items.remove(0);
         item.target = Target::Group(s.document.groups.len() - 1);
