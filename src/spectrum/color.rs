@@ -34,6 +34,9 @@ impl RgbSpace {
     /// DCI P3 with the white of a display (SMPTE EG 432-1).
     pub const P3_D65: Self =
         Self { interop_id: "lin_p3d65_scene", primaries: [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]], white: D65 };
+    /// Adobe RGB (1998).
+    pub const ADOBE_RGB: Self =
+        Self { interop_id: "lin_adobergb_scene", primaries: [[0.64, 0.33], [0.21, 0.71], [0.15, 0.06]], white: D65 };
     /// ACEScg (S-2014-004).
     pub const ACESCG: Self = Self {
         interop_id: "lin_ap1_scene",
@@ -49,7 +52,8 @@ impl RgbSpace {
 
     /// The matrix that makes XYZ of R, G, B; (1, 1, 1) has the chromaticity of the white and Y = 1.
     pub fn xyz_from_rgb(&self) -> DMat3 {
-        let [r, g, b] = self.primaries.map(xyz_of);
+        // Not divided by y, which a primary that is no light may have 0 or less.
+        let [r, g, b] = self.primaries.map(|[x, y]| DVec3::new(x, y, 1.0 - x - y));
         let primaries = DMat3::from_cols(r, g, b);
         let scale = primaries.inverse() * xyz_of(self.white);
         primaries * DMat3::from_diagonal(scale)
@@ -87,8 +91,14 @@ pub fn adaptation(from: [f64; 2], to: [f64; 2]) -> DMat3 {
 mod tests {
     use super::*;
 
-    const SPACES: [RgbSpace; 5] =
-        [RgbSpace::REC709, RgbSpace::REC2020, RgbSpace::P3_D65, RgbSpace::ACESCG, RgbSpace::ACES2065_1];
+    const SPACES: [RgbSpace; 6] = [
+        RgbSpace::REC709,
+        RgbSpace::REC2020,
+        RgbSpace::P3_D65,
+        RgbSpace::ADOBE_RGB,
+        RgbSpace::ACESCG,
+        RgbSpace::ACES2065_1,
+    ];
 
     fn is_near(a: DMat3, b: DMat3, tolerance: f64) -> bool {
         a.to_cols_array().iter().zip(b.to_cols_array()).all(|(a, b)| (a - b).abs() <= tolerance)

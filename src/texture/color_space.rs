@@ -4,7 +4,9 @@
 //! Forum), MaterialX' `cmlib`, the aliases of OpenColorIO's ACES configurations, and UsdPreviewSurface's `raw` and `sRGB`.
 //! White points adapt by Bradford (as published by B. Lindbloom). What has no colour (`raw`, `data`) stays as it is.
 
-use glam::{DMat3, DVec3};
+use glam::DMat3;
+
+use crate::spectrum::color::RgbSpace;
 
 /// From stored numbers to linear light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,23 +43,7 @@ pub struct ColorSpace {
     pub to_rec709: Option<[[f32; 3]; 3]>,
 }
 
-/// CIE xy of red, green, blue and white.
-type Chromaticities = [[f64; 2]; 4];
-
-const D65: [f64; 2] = [0.3127, 0.3290];
-const ACES_WHITE: [f64; 2] = [0.32168, 0.33767];
-/// ITU-R BT.709.
-const REC709: Chromaticities = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], D65];
-/// SMPTE ST 2065-1.
-const AP0: Chromaticities = [[0.7347, 0.2653], [0.0, 1.0], [0.0001, -0.077], ACES_WHITE];
-/// S-2014-004, ACEScg.
-const AP1: Chromaticities = [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], ACES_WHITE];
-/// SMPTE EG 432-1 with the white of D65.
-const P3: Chromaticities = [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060], D65];
-/// ITU-R BT.2020.
-const REC2020: Chromaticities = [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046], D65];
-/// Adobe RGB (1998), whose exponent is 2 + 51/256.
-const ADOBE_RGB: Chromaticities = [[0.64, 0.33], [0.21, 0.71], [0.15, 0.06], D65];
+/// The exponent of Adobe RGB (1998): 2 + 51/256.
 const ADOBE_GAMMA: f32 = 2.199_218_8;
 
 impl ColorSpace {
@@ -72,7 +58,7 @@ impl ColorSpace {
         let name = name.trim().to_ascii_lowercase();
         // USD's names say that they are of scenes, and mean the same.
         let name = name.strip_suffix("_scene").unwrap_or(&name);
-        let (transfer, primaries) = match name {
+        let (transfer, space) = match name {
             "" | "raw" | "data" | "none" | "identity" | "unknown" | "utility - raw" | "non-color" => {
                 return Some(Self::RAW);
             }
@@ -82,7 +68,7 @@ impl ColorSpace {
             | "srgb_rec709"
             | "srgb - texture"
             | "utility - srgb - texture"
-            | "srgb encoded rec.709 (srgb)" => (Srgb, REC709),
+            | "srgb encoded rec.709 (srgb)" => (Srgb, RgbSpace::REC709),
             "lin_rec709"
             | "lin_srgb"
             | "lin_rec709_srgb"
@@ -90,25 +76,25 @@ impl ColorSpace {
             | "scene-linear rec.709-srgb"
             | "linear rec.709 (srgb)"
             | "utility - linear - srgb"
-            | "utility - linear - rec.709" => (Linear, REC709),
-            "g18_rec709" => (Gamma(1.8), REC709),
-            "g22_rec709" => (Gamma(2.2), REC709),
-            "g24_rec709" | "rec709_display" => (Gamma(2.4), REC709),
-            "acescg" | "lin_ap1" | "aces - acescg" => (Linear, AP1),
-            "g22_ap1" => (Gamma(2.2), AP1),
-            "srgb_ap1" => (Srgb, AP1),
-            "aces2065-1" | "aces2065_1" | "lin_ap0" | "aces - aces2065-1" => (Linear, AP0),
-            "lin_p3d65" | "lin_displayp3" => (Linear, P3),
-            "srgb_p3d65" | "srgb_displayp3" => (Srgb, P3),
-            "lin_rec2020" => (Linear, REC2020),
-            "lin_adobergb" => (Linear, ADOBE_RGB),
-            "adobergb" | "g22_adobergb" => (Gamma(ADOBE_GAMMA), ADOBE_RGB),
+            | "utility - linear - rec.709" => (Linear, RgbSpace::REC709),
+            "g18_rec709" => (Gamma(1.8), RgbSpace::REC709),
+            "g22_rec709" => (Gamma(2.2), RgbSpace::REC709),
+            "g24_rec709" | "rec709_display" => (Gamma(2.4), RgbSpace::REC709),
+            "acescg" | "lin_ap1" | "aces - acescg" => (Linear, RgbSpace::ACESCG),
+            "g22_ap1" => (Gamma(2.2), RgbSpace::ACESCG),
+            "srgb_ap1" => (Srgb, RgbSpace::ACESCG),
+            "aces2065-1" | "aces2065_1" | "lin_ap0" | "aces - aces2065-1" => (Linear, RgbSpace::ACES2065_1),
+            "lin_p3d65" | "lin_displayp3" => (Linear, RgbSpace::P3_D65),
+            "srgb_p3d65" | "srgb_displayp3" => (Srgb, RgbSpace::P3_D65),
+            "lin_rec2020" => (Linear, RgbSpace::REC2020),
+            "lin_adobergb" => (Linear, RgbSpace::ADOBE_RGB),
+            "adobergb" | "g22_adobergb" => (Gamma(ADOBE_GAMMA), RgbSpace::ADOBE_RGB),
             "lin_ciexyzd65" => {
-                return Some(Self { transfer: Linear, to_rec709: Some(rows(xyz_from(REC709).inverse())) });
+                return Some(Self { transfer: Linear, to_rec709: Some(rows(RgbSpace::REC709.rgb_from_xyz())) });
             }
             _ => return None,
         };
-        Some(Self { transfer, to_rec709: (primaries != REC709).then(|| to_rec709(primaries)) })
+        Some(Self { transfer, to_rec709: (space != RgbSpace::REC709).then(|| rows(space.to(&RgbSpace::REC709))) })
     }
 
     /// Linear Rec. 709 of a stored colour.
@@ -125,37 +111,8 @@ impl ColorSpace {
     }
 }
 
-fn to_rec709(primaries: Chromaticities) -> [[f32; 3]; 3] {
-    rows(xyz_from(REC709).inverse() * bradford(primaries[3], D65) * xyz_from(primaries))
-}
-
 fn rows(matrix: DMat3) -> [[f32; 3]; 3] {
     matrix.transpose().to_cols_array_2d().map(|row| row.map(|x| x as f32))
-}
-
-fn xyz_of([x, y]: [f64; 2]) -> DVec3 {
-    DVec3::new(x / y, 1.0, (1.0 - x - y) / y)
-}
-
-/// XYZ with Y = 1 for white.
-fn xyz_from([r, g, b, white]: Chromaticities) -> DMat3 {
-    // Not divided by y, which is 0 for no primary here but negative for one.
-    let column = |[x, y]: [f64; 2]| DVec3::new(x, y, 1.0 - x - y);
-    let directions = DMat3::from_cols(column(r), column(g), column(b));
-    let scale = directions.inverse() * xyz_of(white);
-    directions * DMat3::from_diagonal(scale)
-}
-
-fn bradford(from: [f64; 2], to: [f64; 2]) -> DMat3 {
-    if from == to {
-        return DMat3::IDENTITY;
-    }
-    let cone = DMat3::from_cols(
-        DVec3::new(0.8951, -0.7502, 0.0389),
-        DVec3::new(0.2664, 1.7135, -0.0685),
-        DVec3::new(-0.1614, 0.0367, 1.0296),
-    );
-    cone.inverse() * DMat3::from_diagonal((cone * xyz_of(to)) / (cone * xyz_of(from))) * cone
 }
 
 #[cfg(test)]
