@@ -431,10 +431,27 @@ fn computed(
         let fallback = inputs.or("fallback", [0.0, 0.0, 0.0, 1.0], b)?;
         return channel(fallback, output, b);
     }
+    if id.starts_with("MayaND_fileTexture_") {
+        return maya_file(inputs, b);
+    }
     match id.strip_prefix("ND_") {
         Some(rest) => materialx(inputs, rest, output, b, resources),
         None => inputs.unknown(format!("the node '{id}'")),
     }
+}
+
+/// What maya-usd writes behind an image: gain and offset of a Maya file node.
+fn maya_file(inputs: &Inputs<'_>, b: &mut Builder) -> Compiled<Register> {
+    const READ: [&str; 5] = ["inColor", "uvCoord", "defaultColor", "colorGain", "colorOffset"];
+    if let Some(name) =
+        inputs.node.inputs.keys().chain(inputs.node.connected.keys()).find(|n| !READ.contains(&n.as_str()))
+    {
+        return inputs.unknown(format!("inputs:{name}"));
+    }
+    let color = inputs.number("inColor", 0.5, b)?;
+    let [gain, offset] = [inputs.number("colorGain", 1.0, b)?, inputs.number("colorOffset", 0.0, b)?];
+    let scaled = b.binary(F::Multiply, color, gain)?;
+    Ok(b.binary(F::Add, scaled, offset)?)
 }
 
 /// The nodes of MaterialX; `rest` is the identifier without `ND_`.
