@@ -18,13 +18,8 @@ const MOST_NODES: usize = 4096;
 /// Why a node has no operations.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Obstacle {
-    /// The node with this path and identifier is none that is known, or has inputs that are not.
-    Unknown {
-        /// Prim path.
-        path: String,
-        /// `info:id`, and what of it.
-        what: String,
-    },
+    /// A node is none that is known, or something about it is not.
+    Unknown(String),
     /// There are too many of them.
     TooLarge,
 }
@@ -32,7 +27,7 @@ pub(super) enum Obstacle {
 impl std::fmt::Display for Obstacle {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Unknown { path, what } => write!(f, "{what} of <{path}> is not understood"),
+            Self::Unknown(what) => f.write_str(what),
             Self::TooLarge => f.write_str("the network is too large"),
         }
     }
@@ -189,7 +184,7 @@ mod tests {
         ]);
         let (material, diagnostics) = compiled(&nodes, 1).expect("is sound");
         let warning = diagnostics.warnings()[0].to_string();
-        assert!(warning.contains("the node 'ND_noise3d_color3' of </M/Noise> is not understood"), "{warning}");
+        assert!(warning.contains("a network that is not understood (the node 'ND_noise3d_color3')"), "{warning}");
         assert_eq!(material.appearance.albedo.at(&Store::default(), |_| None)[0].to_bits(), 0.18_f32.to_bits());
     }
 }
