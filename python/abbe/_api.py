@@ -14,7 +14,18 @@ from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 from . import _core
 from .errors import UsageError
 
-__all__ = ["Options", "Plan", "Progress", "Scene", "counted", "integrators", "merge", "render", "warning_text"]
+__all__ = [
+    "Options",
+    "Plan",
+    "Progress",
+    "Scene",
+    "asks_for_motion",
+    "counted",
+    "integrators",
+    "merge",
+    "render",
+    "warning_text",
+]
 
 _log = logging.getLogger("abbe")
 
@@ -58,6 +69,7 @@ class Options(TypedDict, total=False):
     wavelength: float | None
     band: tuple[float, float] | None
     dispersion_scale: float | None
+    motion_blur: bool | None
     seed: int | None
     threads: int | None
     texture_memory: int | None
@@ -109,6 +121,13 @@ def _request(options: Options) -> str:
     return "{" + ",".join(texts) + "}"
 
 
+def asks_for_motion(aovs: Sequence[str] | None) -> bool | None:
+    """Tell whether some of ``aovs`` are vectors of motion; None, for the stage to decide, if there are none."""
+    from .usd.tokens import MOTION_SOURCES
+
+    return None if aovs is None else not {*aovs}.isdisjoint(MOTION_SOURCES)
+
+
 def counted(count: int, what: str) -> str:
     """Return ``1 camera``, ``2 cameras``."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
@@ -148,6 +167,8 @@ class Scene:
         mask: Sequence[str] = (),
         payloads: str = "all",
         missing: str = "warn",
+        motion_blur: bool | None = None,
+        motion_vectors: bool | None = None,
         complexity: str | None = None,
         scalar_ior: str | None = None,
         strict: bool = False,
@@ -170,6 +191,8 @@ class Scene:
         mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
         payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
         missing : what to do where a layer, prim or texture that is referred to is missing: ``"warn"`` or ``"error"``
+        motion_blur : whether to read motion while shutters are open; as the stage's products say if None
+        motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
         complexity : ``"low"``, ``"medium"``, ``"high"``, ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
             ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
         scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
@@ -206,6 +229,8 @@ class Scene:
             mask=mask,
             payloads=payloads,
             missing=missing,
+            motion_blur=motion_blur,
+            motion_vectors=motion_vectors,
             complexity=complexity,
             scalar_ior=scalar_ior,
             strict=strict,
@@ -297,6 +322,28 @@ class Scene:
             An option contradicts the scene or another option.
         """
         return [Plan(text, json.loads(fields)) for text, fields in self._core.plan(_request(options))]
+
+    def lights(self) -> list[dict[str, Any]]:
+        """Tell what shines: every light as an integrator that uses lights has it.
+
+        Files of lights are read for it; what is odd about them is logged as a warning.
+
+        Returns
+        -------
+        list of dict
+            ``path``, ``kind``, ``position`` and ``direction`` in the stage's world, ``area``, ``emission`` (linear
+            Rec. 709 by luminance), ``spectrum``, ``power``, ``shaped``, ``texture``, ``group``, and the collections
+            ``illuminates`` and ``shadowed_by``; None for what a light does not have or restrict.
+
+        Raises
+        ------
+        AbbeError
+            A file of a light cannot be read and missing files are errors.
+        """
+        lights, warnings = self._core.lights()
+        for warning in warnings:
+            _log.warning("%s", warning_text(warning))
+        return lights
 
     def trace(self, pixel: tuple[int, int], sample: int = 0, **options: Unpack[Options]) -> dict[str, Any]:
         """Follow one sample and tell every event of its chain.
@@ -416,6 +463,7 @@ def render(
     wavelength: float | None = None,
     band: tuple[float, float] | None = None,
     dispersion_scale: float | None = None,
+    motion_blur: bool | None = None,
     seed: int | None = None,
     threads: int | None = None,
     texture_memory: int | None = None,
@@ -455,6 +503,7 @@ def render(
     wavelength : reference wavelength, nm
     band : ends of the wavelength band of footprints, nm
     dispersion_scale : multiplies all dispersion: 0 none, 1 physical
+    motion_blur : whether samples are spread over the time that the shutter is open
     seed : same seed, same bits, on any number of threads
     threads : all of the machine's if None
     texture_memory : for the texels of images, MB, 4294 if None; what does not fit goes to a temporary file
@@ -497,6 +546,8 @@ def render(
         mask=mask,
         payloads=payloads,
         missing=missing,
+        motion_blur=motion_blur,
+        motion_vectors=asks_for_motion(aovs),
         complexity=complexity,
         scalar_ior=scalar_ior,
         strict=strict,
@@ -513,6 +564,7 @@ def render(
         wavelength=wavelength,
         band=band,
         dispersion_scale=dispersion_scale,
+        motion_blur=motion_blur,
         seed=seed,
         threads=threads,
         texture_memory=texture_memory,

@@ -70,6 +70,13 @@ impl Shot {
     }
 }
 
+impl Shot {
+    /// The camera as authored.
+    pub(super) fn authored<'a>(&self, scene: &'a Scene) -> &'a description::Camera {
+        &scene.document().cameras[self.camera]
+    }
+}
+
 fn product_place(product: Option<&Product>) -> &str {
     product.map_or("render settings", |p| p.path.as_str())
 }
@@ -170,7 +177,8 @@ fn window(request: &Request, product: Option<&Product>, resolution: [u32; 2]) ->
 
 /// A range that holds nothing is ignored, and said so.
 fn check_clipping(camera: &description::Camera, diagnostics: &mut Diagnostics) {
-    if let Some([near, far]) = camera.clipping_range.filter(|[near, far]| !(near < far)) {
+    if let Some([near, far]) = camera.clipping_range.filter(|[near, far]| near >= far || near.is_nan() || far.is_nan())
+    {
         diagnostics.warn(
             "clipping-range",
             format!("{}.clippingRange", camera.path),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Unpack
 
@@ -24,14 +24,17 @@ from .description import Array, ArrayTable, BrokenError, Description, Diagnostic
 from .geometry import ShapeReader
 from .instancers import InstancerReader
 from .lenses import is_lens
+from .lights import LightReader, is_light
+from .links import link_lights
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
-from .passes import Appearance, RenderPass, find_pass
+from .motion import MotionReader, motion_span
+from .passes import ActivePass, Appearance, find_pass
 from .places import Places
 from .primvars import PrimvarReader
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
-from .stage import OpenedStage, Opening, open_stage, source_name
+from .stage import KeptStage, OpenedStage, Opening, open_stage, source_name
 from .subdivision import refinement_level
 from .values import IDENTITY, is_finite, place, read
 
@@ -58,6 +61,9 @@ class _Kind(enum.Enum):
     LEAF = enum.auto()
 
 
+_GEOMETRY = (_Kind.MESH, _Kind.SPHERE, _Kind.SOLID, _Kind.LENS)
+
+
 def _classify(prim: Any) -> _Kind:
     """Return what to do with prims of this one's type; LEAF where nothing below can be rendered."""
     if prim.IsA(UsdGeom.Mesh):
@@ -68,8 +74,11 @@ def _classify(prim: Any) -> _Kind:
         return _Kind.SOLID
     if prim.IsA(UsdGeom.Camera):
         return _Kind.CAMERA
-    if prim.HasAPI(UsdLux.LightAPI) or any(prim.IsA(base) for base in _light_schemas()):
+    if prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase):
         return _Kind.LIGHT
+    if prim.IsA(UsdLux.LightFilter):
+        # Of those that a light asks for, the light's reader speaks.
+        return _Kind.LEAF
     if prim.IsA(UsdGeom.PointInstancer):
         return _Kind.INSTANCER
     if prim.GetTypeName() in ("SkelRoot", "Skeleton"):
@@ -83,11 +92,6 @@ def _classify(prim: Any) -> _Kind:
     return _Kind.PASS_THROUGH
 
 
-def _light_schemas() -> list[Any]:
-    names = ("BoundableLightBase", "NonboundableLightBase", "LightFilter")
-    return [getattr(UsdLux, name) for name in names if hasattr(UsdLux, name)]
-
-
 class _Facts(NamedTuple):
     """What a prim says of itself; the same for a prim of a prototype under every instance."""
 
@@ -95,6 +99,8 @@ class _Facts(NamedTuple):
     invisible: bool
     purpose: str | None
     """None where none is authored."""
+    shines: bool
+    """It is a light by type, or geometry that is one too."""
 
 
 class _State(NamedTuple):
@@ -116,6 +122,14 @@ class _Placed(NamedTuple):
     item: dict[str, Any]
 
 
+class _Light(NamedTuple):
+    """A light on its way into the description."""
+
+    prim: Any
+    transform: list[float] | None
+    """None where it is placed as a shape."""
+
+
 @dataclass
 class _Group:
     """What is placed together: the stage, or a prototype of point instancers."""
@@ -125,6 +139,9 @@ class _Group:
     """The prototype's root prim, whose own transform is that of the instances; None for the stage."""
     placed: list[_Placed] = field(default_factory=list)
     instances: list[dict[str, Any]] = field(default_factory=list)
+    instancers: list[tuple[Any, Any]] = field(default_factory=list)
+    """The prims that these are of, and what they share with other native instances."""
+    lights: list[_Light] = field(default_factory=list)
 
 
 # Deeper nesting of instancers than this nobody models, and Python's own stack would end soon after.
@@ -139,7 +156,7 @@ class _Walk:
         opened: OpenedStage,
         time: Any,
         purposes: frozenset[str],
-        render_pass: RenderPass | None,
+        render_pass: ActivePass | None,
         level: int | None,
         diagnostics: Diagnostics,
     ) -> None:
@@ -204,7 +221,7 @@ class _Walk:
                 if kind is _Kind.INSTANCER:
                     self._instance(prim, source or prim, str(path), state, group)
                 elif kind is not _Kind.PASS_THROUGH:
-                    self._visit(prim, source or prim, str(path), kind, state, group)
+                    self._visit(prim, source or prim, str(path), facts, state, group)
                 elif prim.IsModel():
                     self._check_draw_mode(prim, state)
             except BrokenError as broken:
@@ -223,7 +240,10 @@ class _Walk:
 
         def has_something(root: Any) -> bool:
             index = self._prototype(root, prim, state)
-            return index is not None and bool(self.groups[index].placed or self.groups[index].instances)
+            if index is None:
+                return False
+            group = self.groups[index]
+            return bool(group.placed or group.instances or group.lights)
 
         transform = self._transform(prim, group)
         for elements in self.instancers.elements(prim, source, has_something):
@@ -238,6 +258,7 @@ class _Walk:
             if transform != IDENTITY:
                 item["transform"] = transform
             group.instances.append(item)
+            group.instancers.append((prim, source))
 
     def _prototype(self, root: Any, instancer: Any, state: _State) -> int | None:
         """Return the group of a prototype; None with a warning where it contains the instancer.
@@ -289,12 +310,16 @@ class _Walk:
             kind = self._kinds[type_name] = _classify(prim)
         if kind in (_Kind.MESH, _Kind.PASS_THROUGH) and is_lens(prim):
             kind = _Kind.LENS
+        shines = kind is _Kind.LIGHT or is_light(prim)
+        if shines and kind is _Kind.PASS_THROUGH:
+            kind = _Kind.LIGHT
         attribute = prim.GetAttribute(tokens.PURPOSE)
         authored = bool(attribute) and attribute.HasAuthoredValue()
         return _Facts(
             kind,
             read(prim, tokens.VISIBILITY, self.time) == tokens.INVISIBLE,
             str(read(prim, tokens.PURPOSE, self.time) or tokens.DEFAULT) if authored else None,
+            shines,
         )
 
     @staticmethod
@@ -323,16 +348,14 @@ class _Walk:
         own = self._pass.appearance(prim.GetPath())
         return Appearance(own.hidden or state.appearance.hidden, own.matte or state.appearance.matte)
 
-    def _visit(self, prim: Any, source: Any, path: str, kind: _Kind, state: _State, group: _Group) -> None:
+    def _visit(self, prim: Any, source: Any, path: str, facts: _Facts, state: _State, group: _Group) -> None:
         """Do with a prim what its kind asks for; ``source`` is what it shares with other instances, or itself."""
+        kind = facts.kind
         if kind is _Kind.CAMERA:
             if group.root is None:
                 self.cameras.append(prim)
             return
         if not self._is_rendered(prim):
-            return
-        if kind is _Kind.LIGHT:
-            self.diagnostics.skip("lights: not asked for")
             return
         if not state.visible:
             self.diagnostics.skip("invisible")
@@ -343,6 +366,10 @@ class _Walk:
             return
         if purpose != tokens.DEFAULT and self._hides(prim, purpose):
             self.diagnostics.skip("invisible")
+            return
+        if facts.shines:
+            group.lights.append(_Light(prim, None if kind in _GEOMETRY else self._transform(prim, group)))
+        if kind is _Kind.LIGHT:
             return
         if kind is _Kind.MESH:
             self._place(prim, path, self.shapes.mesh(prim, source), state, group)
@@ -444,6 +471,41 @@ class _Walk:
                 groups[-1]["instances"] = group.instances
         return groups
 
+    def add_motion(self, reader: MotionReader, cameras: Iterable[tuple[Any, dict[str, Any]]]) -> None:
+        """Add to everything that was read where it is at other times."""
+        for prim, mesh in self.shapes.meshes():
+            reader.points(prim, mesh, self.shapes)
+        places: dict[Any, dict[str, dict[str, Any]]] = {}
+        for group in self.groups:
+            moving = [(placed.prim, placed.item) for placed in group.placed]
+            moving += [(prim, item) for (prim, _), item in zip(group.instancers, group.instances, strict=True)]
+            for prim, item in moving:
+                _add(item, "motion", reader.transform(prim, group.root))
+            for (_, source), item in zip(group.instancers, group.instances, strict=True):
+                if source not in places:
+                    places[source] = reader.instances(source, self.instancers)
+                _add(item, "places_motion", places[source].get(item["transforms"]))
+        for prim, camera in cameras:
+            _add(camera, "motion", reader.transform(prim))
+
+    def shine(self, reader: LightReader, groups: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Add lights to the groups, which are bound, and return the sets that they are linked to."""
+        lights = []
+        for group, described in zip(self.groups, groups, strict=True):
+            for prim, transform in group.lights:
+                try:
+                    light = reader.read(prim, is_geometry=transform is None)
+                except BrokenError as broken:
+                    self.diagnostics.leave_out(broken)
+                    continue
+                if light is None:
+                    continue
+                if transform is not None and transform != IDENTITY:
+                    light["transform"] = transform
+                described.setdefault("lights", []).append(light)
+                lights.append((light, prim))
+        return link_lights(groups, lights, self.diagnostics)
+
     def arrays(self) -> dict[str, Array]:
         """Return all arrays by name."""
         return {**self.shapes.arrays, **self._table.arrays}
@@ -492,6 +554,11 @@ class _Walk:
         return None if box.IsEmpty() else _finite_box(list(box.GetMin()), list(box.GetMax()))
 
 
+def _add(item: dict[str, Any], name: str, value: Any) -> None:
+    if value is not None:
+        item[name] = value
+
+
 def _finite_box(low: list[float], high: list[float]) -> tuple[list[float], list[float]] | None:
     return (low, high) if is_finite([*low, *high]) else None
 
@@ -506,6 +573,8 @@ def read_stage(
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
+    motion_blur: bool | None,
+    motion_vectors: bool | None,
     complexity: str | None,
     strict: bool,
     **opening: Unpack[Opening],
@@ -521,7 +590,10 @@ def read_stage(
     with quiet_usd(source, diagnostics):
         # A mask keeps the camera and the settings that were asked for by path.
         also = [path for path in (camera, render_settings, render_pass, product) if path and path.startswith("/")]
-        opened = open_stage(stage_or_path, also=also, diagnostics=diagnostics, **opening)
+        if isinstance(stage_or_path, KeptStage):
+            opened = stage_or_path.open(also, diagnostics, opening)
+        else:
+            opened = open_stage(stage_or_path, also=also, diagnostics=diagnostics, **opening)
         return _read(
             opened,
             diagnostics,
@@ -532,6 +604,8 @@ def read_stage(
             product,
             purposes,
             missing,
+            motion_blur,
+            motion_vectors,
             complexity,
             strict,
         )
@@ -547,6 +621,8 @@ def _read(
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
+    motion_blur: bool | None,
+    motion_vectors: bool | None,
     complexity: str | None,
     strict: bool,
 ) -> Description:
@@ -563,6 +639,8 @@ def _read(
     assets = AssetReader(stage, time)
     materials = MaterialReader(time, diagnostics, _binding_purposes(settings_prim), assets)
     groups = walk.bind(materials)
+    metadata = stage_metadata(opened, time_code, diagnostics)
+    link_sets = walk.shine(LightReader(time, metadata["up_axis"], assets, diagnostics), groups)
 
     cameras: list[dict[str, Any]] = []
     index_by_camera: dict[Any, int] = {}
@@ -573,7 +651,6 @@ def _read(
             cameras.append(read_camera(prim, time, walk.places.cache))
         return index_by_camera[prim]
 
-    metadata = stage_metadata(opened, time_code, diagnostics)
     chosen = find_camera(stage, camera, source) if camera else default_camera(stage, settings_prim, walk.cameras)
     if chosen is not None:
         camera_index(chosen)
@@ -582,7 +659,10 @@ def _read(
     settings = read_settings(
         stage, settings_prim, time, time_code or 0.0, product, camera_index, bool(camera), source, diagnostics
     )
-    _warn_of_motion(walk.instancers.moving, cameras, settings, diagnostics)
+    span = motion_span(stage, time, cameras, settings, motion_blur, motion_vectors)
+    if span is not None:
+        metadata["motion"] = [span.marks[0], span.marks[-1]]
+        walk.add_motion(MotionReader(span, diagnostics), zip(index_by_camera, cameras, strict=False))
     if not any(group["items"] for group in groups):
         diagnostics.warn("nothing-to-render", source, "the stage has no geometry to render: every ray misses")
 
@@ -596,28 +676,13 @@ def _read(
         "materials": materials.materials,
         "textures": assets.textures,
         "cameras": cameras,
+        "link_sets": link_sets,
         "settings": settings,
         "warnings": diagnostics.warnings(),
         "skipped": diagnostics.skipped,
         "strict_assets": missing == "error",
     }
     return Description(document, {**walk.arrays(), **assets.arrays})
-
-
-def _warn_of_motion(
-    instancers: list[Any], cameras: list[dict[str, Any]], settings: dict[str, Any], diagnostics: Diagnostics
-) -> None:
-    """Warn of instancers that move where a camera's shutter is open for a while and blur is not turned off."""
-    base = settings.get("base")
-    products = settings["products"] or ([base] if base else [])
-    is_off = bool(products) and all(product["disable_motion_blur"] for product in products)
-    # A camera that frames the stage has no shutter.
-    if is_off or not any(c.get("shutter_close", 0.0) > c.get("shutter_open", 0.0) for c in cameras):
-        return
-    for prim in instancers:
-        diagnostics.warn(
-            "motion-blur", place(prim), "its instances move; they are rendered where they are at the frame"
-        )
 
 
 def _purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[str]:
