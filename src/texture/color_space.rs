@@ -147,7 +147,7 @@ fn xyz_from([r, g, b, white]: Chromaticities) -> DMat3 {
 }
 
 fn bradford(from: [f64; 2], to: [f64; 2]) -> DMat3 {
-    if from == to {
+    if from.map(f64::to_bits) == to.map(f64::to_bits) {
         return DMat3::IDENTITY;
     }
     let cone = DMat3::from_cols(
