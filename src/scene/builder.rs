@@ -368,6 +368,10 @@ impl<'a> NamedArrays<'a> {
 
     fn integers(&self, name: &str) -> Result<&'a [i32]> {
         let array = self.get(name, Element::I32, 1)?;
+        // An empty array may begin anywhere.
+        if array.bytes.is_empty() {
+            return Ok(&[]);
+        }
         bytemuck::try_cast_slice(&array.bytes).map_err(|_| {
             Error::scene(self.place, format!("array '{name}' is not aligned to its elements: write the file again"))
         })

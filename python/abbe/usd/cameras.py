@@ -95,7 +95,12 @@ def read_camera(prim: Any, time: Any, transforms: Any) -> dict[str, Any]:
     clipping = read(prim, camera.GetClippingRangeAttr().GetName(), time)
     if clipping is not None:
         numbers = np.asarray(clipping)
-        if numbers.shape != (2,) or numbers.dtype.kind not in "fiu" or np.isnan(numbers).any() or np.isinf(numbers[0]):
+        if (
+            numbers.shape != (2,)
+            or numbers.dtype.kind not in "fiu"
+            or not np.isfinite(numbers[0])
+            or not numbers[1] > -np.inf
+        ):
             name = camera.GetClippingRangeAttr().GetName()
             raise StageError(f"{place(prim)}.{name} = {clipping}: is no range: give it a near and a far distance")
         # An infinite far plane is as good as the farthest that the attribute can hold.
