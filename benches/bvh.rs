@@ -54,6 +54,7 @@ fn mesh(points: &Buffer<[f32; 3]>, counts: &[i32], indices: &[i32]) -> Mesh {
         uv_number: None,
         primvars: Vec::new(),
         subsets: &[],
+        subdivision: None,
     };
     Mesh::from_polygons(&polygons).expect("a ball").0
 }

@@ -45,7 +45,7 @@ impl Integrator for Cosine {
     }
 
     fn prepare<'a>(&self, task: &'a Task<'a>) -> Result<Box<dyn PreparedIntegrator + 'a>> {
-        Ok(Box::new(Prepared { task, follower: Follower::new(task.view) }))
+        Ok(Box::new(Prepared { task, follower: Follower::of_camera(task.view, task.camera) }))
     }
 }
 

@@ -1,7 +1,16 @@
 //! Cameras: where rays begin, and how they move with the pixel.
 //!
 //! A direction is d = D/|D| with D = look + x·right + y·up (Igehy 1999, eq. 8); x and y are in pixels, +x right and
-//! +y up. Depth of field is not part of the specular chain: its ray starts at the centre of the lens.
+//! +y up. Through another point o of the lens the ray goes to the same point at the focus distance f, o₀ + f D, so that D
+//! is look + x·right + y·up − (o − o₀)/f there: ∂D is the same, and at a fixed point of the lens ∂p = 0.
+//!
+//! Distances of a camera (focus, near and far) are those of its own space: a scaled camera scales them.
+
+mod clipping;
+mod lens;
+
+pub use clipping::{Clipping, Sight};
+pub use lens::Lens;
 
 use glam::{DMat4, DVec3};
 
@@ -26,6 +35,10 @@ pub enum ConformPolicy {
 }
 
 impl ConformPolicy {
+    /// Their names in USD.
+    pub const TOKENS: [&str; 5] =
+        ["expandAperture", "cropAperture", "adjustApertureWidth", "adjustApertureHeight", "adjustPixelAspectRatio"];
+
     /// The policy called `token`.
     pub fn from_token(token: &str) -> Option<Self> {
         Some(match token {
@@ -60,13 +73,20 @@ pub struct Camera {
     up: DVec3,
     /// The unit axis along which depth is measured.
     axis: DVec3,
+    /// Depth of the points where rays begin: less than 0 where an orthographic view begins behind its camera.
+    start_depth: f64,
     /// Where the image's centre stands in the window, in its units (the aperture offsets).
     centre: [f64; 2],
     resolution: [u32; 2],
+    /// x and y of camera space, and the lens in it; a pinhole without.
+    lens: Option<([DVec3; 2], Lens)>,
+    clipping: Clipping,
 }
 
 impl Camera {
-    /// Fits `camera` to an image of `resolution` pixels.
+    /// Fits `camera` to an image of `resolution` pixels; a pinhole until [`with_lens`](Self::with_lens).
+    ///
+    /// A clipping range whose near plane is not before its far plane clips nothing.
     pub fn new(
         camera: &description::Camera,
         resolution: [u32; 2],
@@ -116,11 +136,16 @@ impl Camera {
         let [x_axis, y_axis, z_axis] =
             [world_from_camera.x_axis, world_from_camera.y_axis, world_from_camera.z_axis].map(|c| c.truncate());
         let shift = x_axis * offset[0] + y_axis * offset[1];
-        let (position, look) = if is_orthographic {
-            (world_from_camera.w_axis.truncate() + shift, (-z_axis).normalize())
+        let clipping_range = camera.clipping_range.filter(|[near, far]| near < far);
+        // Parallel rays may begin behind their camera; those of a perspective begin in it.
+        let behind = clipping_range.map_or(0.0, |[near, _]| near.min(0.0));
+        let eye = world_from_camera.w_axis.truncate();
+        let (position, look, start_depth) = if is_orthographic {
+            (eye + shift - z_axis * behind, (-z_axis).normalize(), behind)
         } else {
-            (world_from_camera.w_axis.truncate(), shift - z_axis)
+            (eye, shift - z_axis, 0.0)
         };
+        let camera_from_render = world_from_camera.inverse() * DMat4::from_translation(position);
         Ok(Self {
             position,
             pixel_aspect_ratio,
@@ -131,9 +156,42 @@ impl Camera {
             right: x_axis * (window[0] / f64::from(resolution[0])),
             up: y_axis * (window[1] / f64::from(resolution[1])),
             axis: (-z_axis).normalize(),
+            start_depth: start_depth * z_axis.length(),
             centre: offset,
             resolution,
+            lens: None,
+            clipping: Clipping::new(&camera_from_render, clipping_range, &camera.clipping_planes),
         })
+    }
+
+    /// The same camera with `lens`, if it has a perspective.
+    pub fn with_lens(mut self, lens: Lens) -> Self {
+        let [x_axis, y_axis] = [self.world_from_camera.x_axis, self.world_from_camera.y_axis].map(|c| c.truncate());
+        self.lens = (!self.is_orthographic).then_some(([x_axis, y_axis], lens));
+        self
+    }
+
+    /// What is not seen, in render space.
+    pub fn clipping(&self) -> &Clipping {
+        &self.clipping
+    }
+
+    /// A box in render space that holds the beginnings of all rays through the raster; `None` where it is one point, the
+    /// origin.
+    pub fn start_box(&self) -> Option<[DVec3; 2]> {
+        let corners = match (self.is_orthographic, &self.lens) {
+            (true, _) => {
+                let [width, height] = self.resolution.map(f64::from);
+                let corner = |x, y| self.ray(&CameraSample::at(x, y)).point;
+                [corner(0.0, 0.0), corner(0.0, height), corner(width, 0.0), corner(width, height)]
+            }
+            (false, Some(([x_axis, y_axis], lens))) => {
+                let [x, y] = [*x_axis * lens.radius, *y_axis * lens.radius];
+                [x + y, x - y, y - x, -x - y]
+            }
+            (false, None) => return None,
+        };
+        Some(corners[1..].iter().fold([corners[0]; 2], |[min, max], corner| [min.min(*corner), max.max(*corner)]))
     }
 
     /// The ray of `sample` with its derivatives per pixel, in render space (relative to [`position`](Self::position)).
@@ -155,7 +213,13 @@ impl Camera {
                 time: 0.0,
             };
         }
-        let big_d = self.look + x * self.right + y * self.up;
+        let mut big_d = self.look + x * self.right + y * self.up;
+        let mut point = DVec3::ZERO;
+        if let Some(([x_axis, y_axis], lens)) = &self.lens {
+            let [x, y] = lens.point(sample.lens);
+            point = x * *x_axis + y * *y_axis;
+            big_d -= point / lens.focus;
+        }
         let length = big_d.length();
         let direction = big_d / length;
         let (a, b) = (self.right / length, self.up / length);
@@ -168,7 +232,7 @@ impl Camera {
             -along_b * d_a - along_a * d_b - d_a.dot(d_b) * direction
         };
         RayStart {
-            point: DVec3::ZERO,
+            point,
             direction,
             point_x: DVec3::ZERO,
             point_y: DVec3::ZERO,
@@ -188,55 +252,9 @@ impl Camera {
 
     /// Distance of the render-space point `p` from the camera, along its axis.
     pub fn depth(&self, p: DVec3) -> f64 {
-        p.dot(self.axis)
+        p.dot(self.axis) + self.start_depth
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn camera() -> Camera {
-        let description = description::Camera {
-            path: "/cam".into(),
-            transform: DMat4::from_rotation_y(0.3).to_cols_array(),
-            projection: "perspective".into(),
-            horizontal_aperture: 36.0,
-            vertical_aperture: 24.0,
-            horizontal_aperture_offset: 3.0,
-            vertical_aperture_offset: -2.0,
-            focal_length: 35.0,
-            clipping_range: None,
-            f_stop: 0.0,
-            focus_distance: 0.0,
-            shutter_open: 0.0,
-            shutter_close: 0.0,
-        };
-        Camera::new(&description, [60, 40], 1.0, ConformPolicy::ExpandAperture).unwrap()
-    }
-
-    #[test]
-    fn derivatives_are_those_of_the_rays() {
-        let camera = camera();
-        let (x, y) = (11.5, 7.25);
-        let at = |dx: f64, dy: f64| camera.ray(&CameraSample::at(x + dx, y - dy));
-        let h = 1e-4;
-        let start = at(0.0, 0.0);
-        let check = |name: &str, analytic: DVec3, difference: DVec3, tolerance: f64| {
-            let scale = start.direction_x.length();
-            assert!((analytic - difference).length() <= tolerance * scale, "{name}: {analytic} against {difference}");
-        };
-        check("x", start.direction_x, (at(h, 0.0).direction - at(-h, 0.0).direction) / (2.0 * h), 1e-9);
-        check("y", start.direction_y, (at(0.0, h).direction - at(0.0, -h).direction) / (2.0 * h), 1e-9);
-        check("xx", start.direction_xx, (at(h, 0.0).direction_x - at(-h, 0.0).direction_x) / (2.0 * h), 1e-9);
-        check("xy", start.direction_xy, (at(0.0, h).direction_x - at(0.0, -h).direction_x) / (2.0 * h), 1e-9);
-        check("yy", start.direction_yy, (at(0.0, h).direction_y - at(0.0, -h).direction_y) / (2.0 * h), 1e-9);
-    }
-
-    #[test]
-    fn the_second_derivative_keeps_the_length() {
-        let start = camera().ray(&CameraSample::at(3.0, 30.0));
-        let residual = start.direction_x.length_squared() + start.direction.dot(start.direction_xx);
-        assert!(residual.abs() <= 1e-16, "{residual}");
-    }
-}
+mod tests;

@@ -82,11 +82,14 @@ fn placement(path: &str, target: Target) -> Placement {
         path: path.into(),
         target,
         transform: None,
+        motion: None,
         instance: None,
         material: None,
         subset_materials: vec![],
         primvars: Default::default(),
         double_sided: false,
+        hidden_from_camera: false,
+        matte: false,
     }
 }
 

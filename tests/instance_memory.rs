@@ -65,6 +65,8 @@ fn bytes_beside_transforms(levels: &[(usize, f64)]) -> [f64; 2] {
             transforms: format!("places{level}"),
             indices: None,
             count,
+            motion: None,
+            places_motion: None,
         });
         s.document.groups.push(Group { path: format!("/P{level}"), items: vec![], instances: vec![] });
     }

@@ -47,7 +47,16 @@ fn places() -> Vec<DAffine3> {
 }
 
 fn instances(path: &str, group: usize, transforms: &str, count: usize) -> Instances {
-    Instances { path: path.into(), group, transform: None, transforms: transforms.into(), indices: None, count }
+    Instances {
+        path: path.into(),
+        group,
+        transform: None,
+        transforms: transforms.into(),
+        indices: None,
+        count,
+        motion: None,
+        places_motion: None,
+    }
 }
 
 /// What `stagehand` and its like prepare at all places, by an array.
@@ -149,8 +158,11 @@ fn lenses_and_solids_of_an_array_are_those_placed_one_by_one() {
             material: None,
             subset_materials: vec![],
             primvars: Default::default(),
+            motion: None,
             instance: Some(format!("/World/Lamp{i}")),
             double_sided: false,
+            hidden_from_camera: false,
+            matte: false,
         });
     }
     assert_same_pixels(&array, &scene(native.description()));

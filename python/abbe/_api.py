@@ -180,6 +180,7 @@ class Scene:
         mask: Sequence[str] = (),
         payloads: str = "all",
         missing: str = "warn",
+        complexity: str | None = None,
         scalar_ior: str | None = None,
         strict: bool = False,
     ) -> Scene:
@@ -200,6 +201,8 @@ class Scene:
         mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
         payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
         missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+        complexity : ``"low"``, ``"medium"``, ``"high"``, ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
+            ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
         scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
         strict : a stage without a camera is an error
 
@@ -233,6 +236,7 @@ class Scene:
             mask=mask,
             payloads=payloads,
             missing=missing,
+            complexity=complexity,
             scalar_ior=scalar_ior,
             strict=strict,
         )
@@ -450,6 +454,7 @@ def render(
     mask: Sequence[str] = (),
     payloads: str = "all",
     missing: str = "warn",
+    complexity: str | None = None,
     scalar_ior: str | None = None,
     strict: bool = False,
     progress: Callable[[Progress], object] | None = None,
@@ -477,7 +482,7 @@ def render(
     threads : all of the machine's if None
     crop : x0, y0, x1, y1 in pixels, half-open, y down
     sample_range : begin and end, half-open: a part that :func:`merge` joins with others
-    purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, scalar_ior : as for
+    purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, complexity, scalar_ior : as for
         :meth:`Scene.from_stage`
     strict : any warning, of the stage or the request, is an error
     progress : called about ten times a second; ``print`` will do
@@ -513,6 +518,7 @@ def render(
         mask=mask,
         payloads=payloads,
         missing=missing,
+        complexity=complexity,
         scalar_ior=scalar_ior,
         strict=strict,
     )

@@ -103,7 +103,7 @@ pub struct Comparison {
 pub fn compare(scene: &Scene, plan: &Plan, rounds: usize) -> Result<Comparison> {
     let camera = crate::render::camera(scene, plan)?;
     let view = View::new(scene, camera.position);
-    let follower = Follower::new(&view);
+    let follower = Follower::of_camera(&view, &camera);
     let tracer = Tracer { scene, follower: &follower, scale: plan.optics.dispersion_scale };
     let nm = plan.optics.reference.nanometers();
     let window = plan.window;
@@ -257,10 +257,9 @@ fn methods(tracer: &Tracer<'_>, nm: f64, cases: &[Case], rounds: usize) -> Resul
             let mut log: Vec<Step> = Vec::new();
             Box::new(move |start| {
                 let mut counters = Counters::default();
-                let _: Chain<NoColumns> =
+                let chain: Chain<NoColumns> =
                     tracer.follower.follow(start, media, Record::of_steps(&mut log), &mut counters);
-                let medium = tracer.follower.start_medium(media, start.time);
-                Some(single::lambda_column(start, &medium, &log))
+                Some(single::lambda_column(start, &chain.start_medium, &log))
             })
         }),
     ];
@@ -310,7 +309,6 @@ fn methods(tracer: &Tracer<'_>, nm: f64, cases: &[Case], rounds: usize) -> Resul
 
 fn predictions(tracer: &Tracer<'_>, nm: f64, cases: &[Case]) -> Result<Vec<Prediction>> {
     let media = tracer.media(nm)?;
-    let medium = tracer.follower.start_medium(&media, 0.0);
     let [mut here, mut there] = [Vec::new(), Vec::new()];
     let mut rows = Vec::new();
     for delta in DISTANCES {
@@ -324,7 +322,7 @@ fn predictions(tracer: &Tracer<'_>, nm: f64, cases: &[Case]) -> Result<Vec<Predi
             let from = end(&tracer.logged(start, &media, &mut here));
             let to = end(&tracer.logged(start, &shifted, &mut there));
             let (Some(from), Some(to), true) = (from, to, are_of_one_family(&here, &there)) else { continue };
-            let along = second_order_along(start, &medium, DVec3::Z, &here);
+            let along = second_order_along(start, &here[0].transfer.medium, DVec3::Z, &here);
             let first = along.point * delta;
             let second = first + along.point2 * (0.5 * delta * delta);
             let moved = to - from;
@@ -355,7 +353,6 @@ fn costs(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart], rounds: usize) -> Re
     let second_chain = || {
         let mut counters = Counters::default();
         let mut log = Vec::new();
-        let medium = tracer.follower.start_medium(&media, 0.0);
         let begin = Instant::now();
         for start in starts {
             let chain = tracer.follower.follow::<ScreenColumns>(
@@ -365,7 +362,7 @@ fn costs(tracer: &Tracer<'_>, nm: f64, starts: &[RayStart], rounds: usize) -> Re
                 &mut counters,
             );
             if chain.is_dispersive {
-                black_box(second_order_along(start, &medium, DVec3::ONE, &log));
+                black_box(second_order_along(start, &chain.start_medium, DVec3::ONE, &log));
             }
         }
         (begin.elapsed().as_secs_f64(), counters.rays)

@@ -194,7 +194,8 @@ impl Aggregate {
             .reduce(f64::max)?
             * UNSEEN_CONDITION;
         let mut extent: Option<Extent> = None;
-        for mut transform in hull.chain([at(0.0)]) {
+        // What is not finite is nowhere, and neither is what is between it and others.
+        for mut transform in hull.chain([at(0.0)]).filter(DAffine3::is_finite) {
             // What is between two places is rounded where it is in the world.
             let rounding = 8.0 * UNIT_ROUNDOFF * transform.translation.abs();
             transform.translation -= self.origin;
@@ -207,7 +208,7 @@ impl Aggregate {
                 farthest: all.farthest.max(farthest),
             }));
         }
-        extent
+        extent.filter(|extent| extent.bounds.reach().is_finite())
     }
 
     /// Bounds of an instance in render space at all times; `None` where it has no extent.
@@ -351,6 +352,22 @@ impl Aggregate {
                 || self.is_instance_moving(instance)
                 || matches!(self.shape(instance), Shape::Mesh(mesh) if mesh.is_deforming());
             moves && is_member(instance)
+        })
+    }
+
+    /// Whether some surface of an instance that `is_member` may lie in the box `[min, max]`, in render space; a no is certain.
+    pub fn has_surface_in(&self, [min, max]: [DVec3; 2], is_member: impl Fn(u32) -> bool) -> bool {
+        let search = Bounds { min, max };
+        let margin = search.reach().max(self.tree.reach()) * self.spread * 2f64.powi(-46);
+        let search = Bounds { min: min - margin, max: max + margin };
+        self.tree.any_meeting(&search, |i| {
+            let instance = self.instance(i);
+            is_member(instance)
+                && self
+                    .bounds_of(instance)
+                    .is_some_and(|bounds| bounds.min.cmple(search.max).all() && search.min.cmple(bounds.max).all())
+                && (self.is_instance_moving(instance)
+                    || self.with(instance, 0.0, |placed| placed.may_meet(&search)) == Some(true))
         })
     }
 

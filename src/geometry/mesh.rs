@@ -5,8 +5,9 @@ use rayon::prelude::*;
 
 use super::Buffer;
 use super::motion::{Between, Deformation, Deformed};
-use super::polygons::{Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
+use super::polygons::{Interpolation, PolygonMesh, PrimvarView};
 use super::start::{Start, behind};
+use super::subdivision::{Refined, Refiner};
 use super::topology;
 use super::tree::{Bounds, Tree};
 use super::triangle::{Corner, ShearedRay, TriangleHit};
@@ -55,6 +56,17 @@ pub struct MeshReport {
     pub faces_in_several_subsets: usize,
     /// The authored normals point against the faces on most of the mesh; they are used reversed.
     pub normals_reversed: bool,
+    /// What was authored and could not be used.
+    pub problems: Vec<MeshProblem>,
+}
+
+/// An attribute that could not be used; the mesh is made without it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MeshProblem {
+    /// Name of the attribute.
+    pub attribute: String,
+    /// What is wrong.
+    pub problem: String,
 }
 
 /// A value at each corner of each triangle.
@@ -102,10 +114,10 @@ pub(super) struct MeshHit {
 }
 
 impl Mesh {
-    /// Checks the arrays, cuts the polygons into triangles and builds the tree.
+    /// Checks the arrays, refines a subdivision surface, cuts the polygons into triangles and builds the tree.
     ///
     /// Errors begin with the prim path and the attribute. What is only odd (faces of two corners, triangles without area,
-    /// overlapping subsets) is left out and counted in the report.
+    /// overlapping subsets, primvars of the wrong size) is left out and stands in the report.
     pub fn from_polygons(polygons: &PolygonMesh<'_>) -> Result<(Self, MeshReport)> {
         Self::deforming(polygons, None)
     }
@@ -116,20 +128,34 @@ impl Mesh {
         deformation: Option<Deformation>,
     ) -> Result<(Self, MeshReport)> {
         polygons.check()?;
-        for (name, primvar, width) in [("normals", &polygons.normals, 3), ("primvars:st", &polygons.uv, 2)] {
-            if let Some(primvar) = primvar {
-                polygons.check_primvar(name, primvar, width)?;
-            }
-        }
-        for NamedPrimvar { name, columns, view } in polygons.primvars.iter().flatten() {
-            polygons.check_primvar(&format!("primvars:{name}"), view, *columns)?;
-        }
         let mut report =
             MeshReport { short_faces: polygons.counts.iter().filter(|&&n| n < 3).count(), ..MeshReport::default() };
+        let polygons = &polygons.with_usable_primvars(&mut report.problems);
         let face_slots = face_slots(polygons, &mut report);
+        let Some(refiner) = refiner(polygons, &mut report) else {
+            let deformation =
+                deformation.map(|d| Deformation { normals: d.normals.filter(|_| polygons.normals.is_some()), ..d });
+            return Ok(Self::assemble(polygons, deformation, face_slots.as_deref(), polygons, report));
+        };
+        let holes = refiner.holes();
+        let control = PolygonMesh { holes: &holes, ..polygons.clone() };
+        let deformation = deformation.map(|deformation| refiner.deformation(&deformation));
+        let refined = Refined::new(&refiner, polygons);
+        drop(refiner);
+        let face_slots = face_slots.map(|slots| refined.of_faces(&slots));
+        Ok(Self::assemble(&refined.polygons(polygons), deformation, face_slots.as_deref(), &control, report))
+    }
 
-        let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(polygons.counts.len());
-        let mut slots = face_slots.as_ref().map(|_| Vec::new());
+    /// Triangles of checked polygons. Whether the mesh has an inside is decided by `control`.
+    fn assemble(
+        polygons: &PolygonMesh<'_>,
+        deformation: Option<Deformation>,
+        face_slots: Option<&[u16]>,
+        control: &PolygonMesh<'_>,
+        mut report: MeshReport,
+    ) -> (Self, MeshReport) {
+        let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(polygons.triangle_count());
+        let mut slots = face_slots.map(|_| Vec::new());
         let mut normals = polygons.normals.as_ref().map(Collector::new);
         let mut uv = polygons.uv.as_ref().map(Collector::new);
         let mut primvars: Vec<_> =
@@ -142,7 +168,7 @@ impl Mesh {
                 return;
             }
             triangles.push(corners.map(|corner| polygons.indices[corner] as u32));
-            if let (Some(slots), Some(face_slots)) = (&mut slots, &face_slots) {
+            if let (Some(slots), Some(face_slots)) = (&mut slots, face_slots) {
                 slots.push(face_slots[face]);
             }
             for values in [&mut normals, &mut uv].into_iter().chain(&mut primvars).flatten() {
@@ -150,7 +176,7 @@ impl Mesh {
             }
         });
         report.triangles = triangles.len();
-        let imbalance = topology::imbalance(polygons);
+        let imbalance = topology::imbalance(control);
         report.open_edges = imbalance.open;
         report.misoriented_edges = imbalance.misoriented;
         report.is_closed = imbalance == topology::Imbalance::default() && !triangles.is_empty();
@@ -180,7 +206,7 @@ impl Mesh {
         };
         mesh.settle_normals();
         report.normals_reversed = mesh.normals_reversed;
-        Ok((mesh, report))
+        (mesh, report)
     }
 
     /// How many triangles rays can meet.
@@ -397,6 +423,16 @@ impl<'a> Collector<'a> {
     fn finish(self) -> CornerValues {
         CornerValues { values: self.primvar.values.clone(), indices: self.indices }
     }
+}
+
+/// The refined topology of a subdivision surface; `None` for polygons and for what cannot be refined.
+fn refiner(polygons: &PolygonMesh<'_>, report: &mut MeshReport) -> Option<Refiner> {
+    let subdivision = polygons.subdivision.as_ref().filter(|subdivision| subdivision.level > 0)?;
+    let mut problems = Vec::new();
+    let refiner = Refiner::new(polygons, subdivision, &mut problems);
+    let as_problem = |problem| MeshProblem { attribute: "subdivisionScheme".to_owned(), problem };
+    report.problems.extend(problems.into_iter().map(as_problem));
+    refiner
 }
 
 /// The slot of each face; `None` without subsets. A face in two subsets belongs to the first.

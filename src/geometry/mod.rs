@@ -25,6 +25,7 @@ mod revolved;
 mod solid;
 mod sphere;
 mod start;
+mod subdivision;
 mod surface;
 mod topology;
 mod tree;
@@ -39,13 +40,16 @@ pub use cuboid::{Cuboid, Rectangle};
 pub use departures::Departures;
 pub(crate) use instances::affine;
 pub use instances::{Instance, InstanceArray, Location, Numbering, Part};
-pub use mesh::{Mesh, MeshReport};
+pub use mesh::{Mesh, MeshProblem, MeshReport};
 pub use motion::{Deformation, PlaceSamples, Pose, Track, are_increasing};
 pub(crate) use placed::is_invertible;
 pub use polygons::{Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
 pub use revolved::{Cap, Revolved};
 pub use solid::{Axis, Solid};
 pub use sphere::Sphere;
+pub use subdivision::{
+    BoundaryInterpolation, FaceVaryingInterpolation, MAX_TRIANGLES, Scheme, Subdivision, TriangleRule,
+};
 
 /// A ray in render space.
 #[derive(Clone, Copy, Debug, PartialEq)]

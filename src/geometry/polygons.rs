@@ -4,6 +4,8 @@ use earcut::Earcut;
 use glam::{DVec2, DVec3};
 
 use super::Buffer;
+use super::mesh::MeshProblem;
+use super::subdivision::Subdivision;
 use crate::{Error, Result};
 
 /// How the values of a primvar belong to a mesh (UsdGeomPrimvar).
@@ -92,6 +94,8 @@ pub struct PolygonMesh<'a> {
     pub primvars: Vec<Option<NamedPrimvar<'a>>>,
     /// Faces with slots of their own: prim path of the subset and face indices.
     pub subsets: &'a [(&'a str, &'a [i32])],
+    /// Makes the mesh the control mesh of a subdivision surface.
+    pub subdivision: Option<Subdivision<'a>>,
 }
 
 impl<'a> PolygonMesh<'a> {
@@ -151,14 +155,38 @@ impl<'a> PolygonMesh<'a> {
         Ok(())
     }
 
-    /// Checks a primvar with `width` floats a value.
-    pub(super) fn check_primvar(&self, name: &str, primvar: &PrimvarView<'_>, width: usize) -> Result<()> {
+    /// The mesh without primvars that do not fit; they are named in `problems`.
+    pub(super) fn with_usable_primvars(&self, problems: &mut Vec<MeshProblem>) -> Self {
+        let mut mesh = self.clone();
+        for (name, primvar, width) in [("normals", &mut mesh.normals, 3), ("primvars:st", &mut mesh.uv, 2)] {
+            if let Some((attribute, problem)) = primvar.as_ref().and_then(|p| self.primvar_problem(name, p, width)) {
+                problems.push(MeshProblem { attribute, problem: format!("{problem}; it is left out") });
+                *primvar = None;
+            }
+        }
+        for primvar in &mut mesh.primvars {
+            let Some(NamedPrimvar { name, columns, view }) = primvar else { continue };
+            if let Some((attribute, problem)) = self.primvar_problem(&format!("primvars:{name}"), view, *columns) {
+                problems.push(MeshProblem { attribute, problem: format!("{problem}; it is left out") });
+                *primvar = None;
+            }
+        }
+        mesh
+    }
+
+    /// How many triangles its faces are cut into.
+    pub(super) fn triangle_count(&self) -> usize {
+        self.faces().map(|(_, _, count)| count - 2).sum()
+    }
+
+    /// What is wrong with a primvar of `width` floats a value: the attribute and the problem.
+    fn primvar_problem(&self, name: &str, primvar: &PrimvarView<'_>, width: usize) -> Option<(String, String)> {
         let values = primvar.values.len() / width;
         if !primvar.values.len().is_multiple_of(width) {
-            return Err(self.error(name, format!("{} floats are not a multiple of {width}", primvar.values.len())));
+            return Some((name.to_owned(), format!("{} floats are not a multiple of {width}", primvar.values.len())));
         }
         if let Some(i) = primvar.values.iter().position(|x| !x.is_finite()) {
-            return Err(self.error(name, format!("value {} is not finite; correct or remove it", i / width)));
+            return Some((name.to_owned(), format!("value {} is not finite; correct or remove it", i / width)));
         }
         let elements = match primvar.interpolation {
             Interpolation::Constant => 1,
@@ -171,15 +199,15 @@ impl<'a> PolygonMesh<'a> {
             let element = primvar.interpolation.element();
             let problem =
                 format!("{given} values for one per {element}, which makes {elements}; author the missing ones");
-            return Err(self.error(name, problem));
+            return Some((name.to_owned(), problem));
         }
         if let Some(indices) = primvar.indices
             && let Some(i) = out_of_range(indices, values)
         {
             let problem = format!("index {i} is {}, but there are {values} values", indices[i]);
-            return Err(self.error(&format!("{name}:indices"), problem));
+            return Some((format!("{name}:indices"), problem));
         }
-        Ok(())
+        None
     }
 
     /// Which faces are not holes and have at least three corners, with their first corner and their number of corners.

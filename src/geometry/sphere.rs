@@ -35,7 +35,8 @@ impl Sphere {
         let q = to_nearest + half_chord.copysign(to_nearest);
         let distance = origin.length();
         let other = (distance - self.radius) * (distance + self.radius) / q;
-        let roots = if to_nearest < 0.0 { [q, other] } else { [other, q] };
+        // The sign of q, not of `to_nearest`, which may be −0.
+        let roots = if q < 0.0 { [q, other] } else { [other, q] };
         (roots[0] < roots[1]).then_some(roots)
     }
 
@@ -59,6 +60,18 @@ mod tests {
         let [near, far] = sphere.roots(DVec3::new(0.0, 0.5, -1e8), DVec3::Z).expect("from far away");
         let half = 0.75_f64.sqrt();
         assert!((near - (1e8 - half)).abs() < 3e-8 && (far - (1e8 + half)).abs() < 3e-8);
+    }
+
+    #[test]
+    fn a_start_abreast_of_the_centre_has_a_root_on_either_side() {
+        let sphere = Sphere::new(1.0).expect("positive");
+        for direction in [DVec3::Z, DVec3::NEG_Z, DVec3::new(-0.0, -0.0, 1.0), DVec3::new(-0.0, 0.0, -1.0)] {
+            for origin in [DVec3::ZERO, DVec3::new(0.6, 0.0, 0.0), DVec3::new(0.0, -0.6, -0.0)] {
+                let half = (1.0 - origin.length_squared()).sqrt();
+                let [near, far] = sphere.roots(origin, direction).expect("from inside");
+                assert!((near + half).abs() < 1e-15 && (far - half).abs() < 1e-15, "{origin} {direction}");
+            }
+        }
     }
 
     #[test]

@@ -3,10 +3,15 @@
 //! Deterministic, at one wavelength: transmit at every transmissive interface, reflect where reflection is total and at
 //! smooth mirrors. It ends at the first other surface, at a miss, or after [`MAX_EVENTS`] events. The geometric normal
 //! alone decides entering or leaving; the media around the ray are a stack with priorities.
+//!
+//! A camera does not see what its planes clip and what is hidden from it. That holds until the ray is first refracted or
+//! reflected: its later segments meet everything. Media are not cut: a ray goes straight through a surface that its camera
+//! does not see, and begins behind the last such surface, in the media that are there.
 
 use glam::DVec3;
 
 use super::transmittance::Segment;
+use crate::camera::{Camera, Clipping, Sight};
 use crate::geometry::{Departures, Hit, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
@@ -56,6 +61,8 @@ pub struct Chain<C> {
     pub end: End,
     /// The first surface that is there at all (cut-outs are not).
     pub first: Option<SurfacePoint>,
+    /// Index of the medium where the ray begins.
+    pub start_medium: IorJet,
     /// Unit direction of the last segment.
     pub direction: DVec3,
     /// Index of the last segment's medium at the chain's wavelength.
@@ -101,6 +108,8 @@ pub struct Counters {
     pub geometric_normal_events: u64,
     /// Media left inside of another of the same priority: objects that overlap undecided.
     pub undecided_overlaps: u64,
+    /// Surfaces that the camera does not see, clipped or hidden from it.
+    pub unseen: u64,
 }
 
 impl Counters {
@@ -117,6 +126,7 @@ impl Counters {
             exhausted: f(self.exhausted, other.exhausted),
             geometric_normal_events: f(self.geometric_normal_events, other.geometric_normal_events),
             undecided_overlaps: f(self.undecided_overlaps, other.undecided_overlaps),
+            unseen: f(self.unseen, other.unseen),
         }
     }
 
@@ -179,24 +189,52 @@ impl<'r> Record<'r> {
 #[derive(Debug)]
 pub struct Follower<'a> {
     view: &'a View<'a>,
-    /// The media around the camera; absent where they change with time.
-    outside: Option<MediaStack>,
+    outside: Outside,
+    /// What a camera does not see; `None` if it sees everything.
+    unseen: Option<Clipping>,
+}
+
+/// The media where rays start.
+#[derive(Debug)]
+enum Outside {
+    /// The same everywhere.
+    Same(MediaStack),
+    /// The same for all rays that start in this box.
+    SameWithin([DVec3; 2], MediaStack),
+    /// Different from ray to ray, in place or time.
+    Different,
 }
 
 impl<'a> Follower<'a> {
-    /// For rays that start at the camera of `view`.
+    /// For rays that start at the camera of `view` and see everything.
     pub fn new(view: &'a View<'a>) -> Self {
-        Self { view, outside: (!view.is_eye_passing_glass()).then(|| view.media_around_eye(0.0)) }
+        let outside =
+            if view.is_eye_passing_glass() { Outside::Different } else { Outside::Same(view.media_around_eye(0.0)) };
+        Self { view, outside, unseen: None }
     }
 
-    /// The media around the camera at a time.
-    fn outside_at(&self, time: f64) -> MediaStack {
-        self.outside.clone().unwrap_or_else(|| self.view.media_around_eye(time))
+    /// For the rays of `camera`, whose position is the origin of `view`.
+    pub fn of_camera(view: &'a View<'a>, camera: &Camera) -> Self {
+        let outside = match camera.start_box() {
+            None => Self::new(view).outside,
+            Some(starts) if view.has_glass_in(starts) => Outside::Different,
+            Some(starts) => Outside::SameWithin(starts, view.media_at(0.5 * (starts[0] + starts[1]), 0.0)),
+        };
+        let clipping = match view.aggregate.bounds() {
+            Some(bounds) if !camera.clipping().is_empty() => camera.clipping().of_box(bounds),
+            _ => Clipping::default(),
+        };
+        let unseen = (view.scene.objects.hides_some() || !clipping.is_empty()).then_some(clipping);
+        Self { view, outside, unseen }
     }
 
-    /// The medium around the camera at a time.
-    pub fn start_medium(&self, media: &Media, time: f64) -> IorJet {
-        media.of(self.outside_at(time).current())
+    fn media_around(&self, start: &RayStart) -> MediaStack {
+        let p = start.point;
+        match &self.outside {
+            Outside::Same(media) => media.clone(),
+            Outside::SameWithin([min, max], media) if min.cmple(p).all() && p.cmple(*max).all() => media.clone(),
+            Outside::SameWithin(..) | Outside::Different => self.view.media_at(p, start.time),
+        }
     }
 
     /// The first surface alone: nothing is followed.
@@ -230,6 +268,7 @@ impl<'a> Follower<'a> {
         let mut chain = Chain {
             end: End::Miss,
             first: None,
+            start_medium: medium,
             direction: start.direction,
             medium,
             columns: C::start(start, &medium),
@@ -242,7 +281,14 @@ impl<'a> Follower<'a> {
         };
         let columns_carried = u64::from(C::LAMBDA) + 2 * u64::from(C::SCREEN) + u64::from(C::SECOND);
         let mut momentum = medium.ior * start.direction;
-        while let Some(met) = walk.advance(counters) {
+        loop {
+            let met = walk.advance(counters);
+            if std::mem::take(&mut walk.begins_anew) {
+                medium = media.of(walk.media.current());
+                momentum = medium.ior * start.direction;
+                (chain.start_medium, chain.columns) = (medium, C::start(start, &medium));
+            }
+            let Some(met) = met else { break };
             let cut_out = walk.is_cut_out(&met);
             if !cut_out && chain.first.is_none() {
                 chain.first = Some(met);
@@ -270,7 +316,7 @@ impl<'a> Follower<'a> {
                     chain.columns.transfer(&transfer);
                     counters.column_updates += columns_carried;
                     record.step(&transfer, None);
-                    record.segment(transfer.distance, travelled);
+                    record.segment(transfer.distance - walk.begin, travelled);
                     chain.end = End::Surface(met);
                     break;
                 }
@@ -318,9 +364,12 @@ impl<'a> Follower<'a> {
                 ScatterKind::Mirror => {}
             }
             momentum = scattering.momentum_out;
-            walk.turn(&met, momentum / medium.ior, &scattering);
             record.step(&transfer, Some(&scattering));
-            record.segment(transfer.distance, travelled);
+            record.segment(transfer.distance - walk.begin, travelled);
+            walk.turn(&met, momentum / medium.ior, &scattering);
+        }
+        if walk.is_lost {
+            chain.end = End::Exhausted;
         }
         if matches!(chain.end, End::Miss) {
             record.segment(f64::INFINITY, walk.media.current());
@@ -349,6 +398,14 @@ struct Walk<'a> {
     /// From the last event to the last surface met.
     travelled: f64,
     crossings: u32,
+    /// Where the camera sees surfaces; `None` once the ray was refracted or reflected, or where it sees all.
+    sight: Option<Sight>,
+    /// How far from its start the ray begins: behind the last surface that the camera does not see.
+    begin: f64,
+    /// Whether `begin` has moved, and the media with it.
+    begins_anew: bool,
+    /// Whether there were too many surfaces that the camera does not see.
+    is_lost: bool,
 }
 
 impl<'a> Walk<'a> {
@@ -356,20 +413,51 @@ impl<'a> Walk<'a> {
         Self {
             view: follower.view,
             ray: Ray { origin: start.point, direction: start.direction, time: start.time },
-            media: follower.outside_at(start.time),
+            media: follower.media_around(start),
             departures: Departures::none(),
             travelled: 0.0,
             crossings: 0,
+            sight: follower.unseen.as_ref().map(|clipping| clipping.sight(start.point, start.direction)),
+            begin: 0.0,
+            begins_anew: false,
+            is_lost: false,
         }
     }
 
-    /// The next surface.
+    /// The next surface that is seen.
     fn advance(&mut self, counters: &mut Counters) -> Option<SurfacePoint> {
-        counters.rays += 1;
-        let hit = self.view.intersect(&self.ray, &self.departures)?;
-        let (point, surface) = self.view.aggregate.local_surface(&self.ray, &hit);
-        self.travelled += hit.distance;
-        Some(SurfacePoint { hit, point, surface, material_id: self.view.material_id(&hit) })
+        loop {
+            counters.rays += 1;
+            let hit = self.view.intersect(&self.ray, &self.departures)?;
+            let (point, surface) = self.view.aggregate.local_surface(&self.ray, &hit);
+            self.travelled += hit.distance;
+            let met = SurfacePoint { hit, point, surface, material_id: self.view.material_id(&hit) };
+            let Some(sight) = self.sight else { return Some(met) };
+            if self.travelled > sight.far {
+                counters.unseen += 1;
+                return None;
+            }
+            if self.travelled >= sight.near && !self.view.is_hidden_from_camera(&hit) {
+                return Some(met);
+            }
+            self.overlook(&met, counters);
+            if self.crossings > MAX_CROSSINGS {
+                self.is_lost = true;
+                return None;
+            }
+        }
+    }
+
+    /// Goes straight on through a surface that the camera does not see, into the media behind it.
+    fn overlook(&mut self, met: &SurfacePoint, counters: &mut Counters) {
+        counters.unseen += 1;
+        match self.view.inside(&met.hit, met.material_id) {
+            Some(inside) if met.hit.leaving => counters.unmatched_exits += u64::from(!self.media.leave(&inside)),
+            Some(inside) => self.media.enter(inside),
+            None => {}
+        }
+        self.cross(met);
+        (self.begin, self.begins_anew) = (self.travelled, true);
     }
 
     fn is_cut_out(&self, met: &SurfacePoint) -> bool {
@@ -414,7 +502,7 @@ impl<'a> Walk<'a> {
             self.departures.depart(&self.ray, &met.hit, !met.hit.leaving);
         }
         self.ray = Ray { origin: met.point, direction: direction.normalize(), ..self.ray };
-        self.travelled = 0.0;
+        (self.travelled, self.begin, self.sight) = (0.0, 0.0, None);
     }
 
     /// What happens at the surface; straight crossings are made at once.

@@ -12,7 +12,6 @@ use super::{Columns, Integrator, PreparedIntegrator, Task, Worker};
 use crate::error::{Error, Result};
 use crate::film::aov::{AOVS, Aov, Family, INTERNAL_TRANSMITTANCE};
 use crate::film::pixel::PixelAccumulator;
-use crate::optics::IorJet;
 use crate::ray::{
     ColumnSet, LambdaColumn, NoColumns, RayStart, ScreenColumns, SecondOrderColumns, Step, direction_derivative,
     direction_second_derivative, half_width, screen_motion, second_order_along,
@@ -149,7 +148,7 @@ impl<'a> Prepared<'a> {
         let channels: &[_] = if task.needs.retrace { &task.optics.channels } else { &[] };
         Ok(Self {
             task,
-            follower: Follower::new(task.view),
+            follower: Follower::of_camera(task.view, task.camera),
             media: media(task.optics.reference)?,
             channel_media: channels.iter().map(|&wavelength| media(wavelength)).collect::<Result<_>>()?,
             outputs: task.aovs.iter().map(|aov| Output::of(aov)).collect(),
@@ -237,8 +236,7 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
                 Output::HalfWidth => out.add(layer, scalar(sample.half_width())),
                 Output::Motion => out.add(layer, sample.visible_motion()),
                 Output::Motion2 => {
-                    let motion2 =
-                        sample.motion2(&start, follower.start_medium(media, start.time), &self.log, &mut self.counters);
+                    let motion2 = sample.motion2(&start, &self.log, &mut self.counters);
                     out.add(layer, motion2);
                 }
                 Output::Fetch(channel) => {
@@ -498,13 +496,13 @@ impl<C: ColumnSet> Sample<'_, C> {
         self.motion().filter(|motion| motion.length_squared() <= width * width + height * height)
     }
 
-    fn motion2(&self, start: &RayStart, start_medium: IorJet, log: &[Step], counters: &mut Counters) -> Option<DVec2> {
+    fn motion2(&self, start: &RayStart, log: &[Step], counters: &mut Counters) -> Option<DVec2> {
         let motion = self.visible_motion()?;
         if !self.chain.is_dispersive {
             return Some(DVec2::ZERO);
         }
         counters.second_chains += 1;
-        let along = second_order_along(start, &start_medium, motion.extend(1.0), log);
+        let along = second_order_along(start, &self.chain.start_medium, motion.extend(1.0), log);
         let [v_x, v_y] = self.end.screen_columns(self.chain)?;
         let second = if self.end.kind == EndKind::Surface {
             along.point2

@@ -127,6 +127,7 @@ fn settings_hash(scene: &Scene, plan: &Plan) -> String {
         "camera": scene.document().cameras[plan.camera],
         "resolution": plan.resolution,
         "pixelAspectRatio": plan.pixel_aspect_ratio,
+        "depthOfField": plan.depth_of_field,
         "conformPolicy": format!("{:?}", plan.conform_policy),
         "samples": plan.samples.total,
         "seed": plan.seed,

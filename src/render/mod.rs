@@ -7,6 +7,7 @@ pub mod metadata;
 pub mod plan;
 pub mod request;
 mod settings;
+mod shot;
 pub mod trace;
 mod validity;
 
@@ -21,7 +22,7 @@ pub use plan::{Plan, plan};
 pub use request::Request;
 pub use trace::trace;
 
-use crate::camera::Camera;
+use crate::camera::{Camera, Lens};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::Aov;
@@ -121,7 +122,11 @@ pub fn render(scene: &Scene, plan: &Plan, registry: &Registry, control: &Control
 /// The camera of `plan`, fitted to its image.
 pub(crate) fn camera(scene: &Scene, plan: &Plan) -> Result<Camera> {
     let authored = &scene.document().cameras[plan.camera];
-    Camera::new(authored, plan.resolution, plan.pixel_aspect_ratio, plan.conform_policy)
+    let camera = Camera::new(authored, plan.resolution, plan.pixel_aspect_ratio, plan.conform_policy)?;
+    Ok(match Lens::of(authored) {
+        Some(lens) if plan.depth_of_field => camera.with_lens(lens),
+        _ => camera,
+    })
 }
 
 fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Control<'_>) -> Result<Rendered> {
@@ -205,6 +210,22 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
                 "{} times a ray left one glass inside of another of the same priority: the objects overlap, and which \
                  medium fills the overlap depends on where the ray comes from: author abbe:dielectricPriority (lower wins)",
                 counters.undecided_overlaps
+            ),
+        );
+    }
+    let authored = &scene.document().cameras[plan.camera];
+    if counters.unseen > 0
+        && let Some([near, far]) = authored.clipping_range
+        && !authored.clipping_authored
+        && authored.clipping_planes.is_empty()
+        && !scene.objects.hides_some()
+    {
+        warnings.warn(
+            "clipped-by-fallback",
+            format!("{}.clippingRange", authored.path),
+            format!(
+                "is not authored, and its fallback ({near}, {far}) hides surfaces from {} rays: author the range that is                  wanted",
+                counters.unseen
             ),
         );
     }

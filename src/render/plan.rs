@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::request::Request;
 use super::settings::{self, Attributes};
+use super::shot::{DepthOfField, Shot};
 use super::validity;
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
@@ -97,6 +98,8 @@ pub struct Plan {
     /// How the aperture is fitted.
     #[serde(skip)]
     pub conform_policy: ConformPolicy,
+    /// Whether samples are spread over the lens.
+    pub depth_of_field: bool,
     /// Samples rendered.
     pub samples: SampleRange,
     /// Seed of the sample positions.
@@ -148,29 +151,8 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let mut diagnostics = Diagnostics::default();
     let attributes = Attributes::new(scene, product);
 
-    let (camera, camera_path) = settings::camera(scene, request, product)?;
-    let authored_camera = &scene.document().cameras[camera];
-    let resolution = settings::resolution(request, product, authored_camera)?;
-    let window = settings::window(request, product, resolution)?;
-    let policy = product.map_or("expandAperture", |p| p.aspect_ratio_conform_policy.as_str());
-    let conform_policy = ConformPolicy::from_token(policy).ok_or_else(|| {
-        Error::scene(
-            settings::product_place(product),
-            format!("unknown aspectRatioConformPolicy '{policy}': use expandAperture"),
-        )
-    })?;
-    if authored_camera.f_stop > 0.0
-        && authored_camera.focus_distance > 0.0
-        && !product.is_some_and(|p| p.disable_depth_of_field)
-    {
-        diagnostics.warn(
-            "depth-of-field",
-            &camera_path,
-            "depth of field is not rendered: rays start at the centre of the lens",
-        );
-    }
-
     let samples = settings::samples(request, &attributes)?;
+    let shot = Shot::new(scene, request, product, samples, &mut diagnostics)?;
     let optics = settings::optics(request, &attributes)?;
     let (integrator, layers) = settings::layers(request, &attributes, product, registry, &mut diagnostics)?;
     let integrator = registry.find(&integrator)?;
@@ -180,7 +162,10 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let mut needs = integrator.needs(&aovs, dispersive.is_some());
     needs.transmittance &= absorbing.is_some();
     validity::check(scene, &optics, &needs, &aovs)?;
-    let (carried, skipped) = reasons(scene, integrator, &layers, &needs, [dispersive, absorbing], &optics);
+    let (mut carried, mut skipped) = reasons(scene, integrator, &layers, &needs, [dispersive, absorbing], &optics);
+    let DepthOfField { is_on, why } = &shot.depth_of_field;
+    (if *is_on { &mut carried } else { &mut skipped })
+        .push(Decision { what: "depth of field".to_owned(), why: why.clone() });
     let seed = match (request.seed, attributes.integer("abbe:seed")?) {
         (Some(seed), _) => seed,
         (None, Some(seed)) => seed as u64,
@@ -195,12 +180,13 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     Ok(Plan {
         product: product.map(|p| p.path.clone()).unwrap_or_default(),
         output: product.map(|p| p.name.clone()).unwrap_or_default(),
-        camera,
-        camera_path,
-        resolution,
-        window,
-        pixel_aspect_ratio: product.map_or(1.0, |p| p.pixel_aspect_ratio),
-        conform_policy,
+        camera: shot.camera,
+        camera_path: shot.camera_path,
+        resolution: shot.resolution,
+        window: shot.window,
+        pixel_aspect_ratio: shot.pixel_aspect_ratio,
+        conform_policy: shot.conform_policy,
+        depth_of_field: shot.depth_of_field.is_on,
         samples,
         seed,
         threads: settings::threads(request)?,

@@ -16,6 +16,8 @@ pub struct Request {
     pub height: Option<u32>,
     /// Samples per pixel.
     pub samples: Option<u32>,
+    /// Whether samples are spread over the lens; as the stage says if absent.
+    pub depth_of_field: Option<bool>,
     /// Name of an integrator.
     pub integrator: Option<String>,
     /// AOVs, in the order of the film's layers; the stage's RenderVars if absent.

@@ -6,16 +6,12 @@ use super::plan::PlannedLayer;
 use super::request::Request;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::film::{SampleRange, Window, aov, sum};
+use crate::film::{SampleRange, aov, sum};
 use crate::integrator::{Optics, Registry};
 use crate::scene::Scene;
-use crate::scene::description::{self, Authored, AuthoredMap, Product};
+use crate::scene::description::{Authored, AuthoredMap, Product};
 use crate::spectrum::{self, Wavelength};
 
-/// Width of an image for which neither the request nor the stage says one (as usdrecord).
-const DEFAULT_WIDTH: u32 = 960;
-/// The largest image side: what an EXR window can address with room for arithmetic.
-const MAX_SIDE: u32 = 1 << 17;
 /// More threads than this would spend their time on each other: no machine has as many cores.
 const MAX_THREADS: usize = 1024;
 /// Wavelengths that a reference, a band or a channel may have, nm: the transport's.
@@ -37,104 +33,6 @@ const DEFAULT_AOVS: &[&str] = &[
     "prim_id",
     "material_id",
 ];
-
-pub(super) fn product_place(product: Option<&Product>) -> &str {
-    product.map_or("render settings", |p| p.path.as_str())
-}
-
-pub(super) fn camera(scene: &Scene, request: &Request, product: Option<&Product>) -> Result<(usize, String)> {
-    let cameras = &scene.document().cameras;
-    let index = match &request.camera {
-        Some(wanted) => cameras
-            .iter()
-            .position(|c| c.path == *wanted || c.path.rsplit('/').next() == Some(wanted.as_str()))
-            .ok_or_else(|| {
-                let known: Vec<_> = cameras.iter().map(|c| c.path.as_str()).collect();
-                Error::usage(
-                    format!("--camera {wanted}"),
-                    format!("the scene has no such camera: {}", known.join(", ")),
-                )
-            })?,
-        None => product.and_then(|p| p.camera).unwrap_or(0),
-    };
-    let camera = cameras.get(index).ok_or_else(|| {
-        Error::scene(
-            product_place(product),
-            format!("camera {index} of {} does not exist: export the stage again", cameras.len()),
-        )
-    })?;
-    Ok((index, camera.path.clone()))
-}
-
-pub(super) fn resolution(
-    request: &Request,
-    product: Option<&Product>,
-    camera: &description::Camera,
-) -> Result<[u32; 2]> {
-    let authored = match product.and_then(|p| p.resolution) {
-        Some([w, h]) => {
-            let side = |v: i64| u32::try_from(v).ok().filter(|&v| v > 0 && v <= MAX_SIDE);
-            let (Some(w), Some(h)) = (side(w), side(h)) else {
-                return Err(Error::scene(
-                    format!("{}.resolution", product_place(product)),
-                    format!("is ({w}, {h}): each side must be 1 to {MAX_SIDE} pixels"),
-                ));
-            };
-            Some([w, h])
-        }
-        None => None,
-    };
-    for (flag, value) in [("--width", request.width), ("--height", request.height)] {
-        if value.is_some_and(|v| v == 0 || v > MAX_SIDE) {
-            return Err(Error::usage(flag, format!("must be 1 to {MAX_SIDE} pixels, not {}", value.unwrap_or(0))));
-        }
-    }
-    let aspect =
-        authored.map_or(camera.horizontal_aperture / camera.vertical_aperture, |[w, h]| f64::from(w) / f64::from(h));
-    // The height is cut off, as usdrecord does, but never to nothing.
-    let side = |v: f64| if v.is_finite() { (v.floor() as u32).clamp(1, MAX_SIDE) } else { 1 };
-    Ok(match (request.width, request.height, authored) {
-        (Some(w), Some(h), _) => [w, h],
-        (Some(w), None, _) => [w, side(f64::from(w) / aspect)],
-        (None, Some(h), _) => [side(f64::from(h) * aspect), h],
-        (None, None, Some(authored)) => authored,
-        (None, None, None) => [DEFAULT_WIDTH, side(f64::from(DEFAULT_WIDTH) / aspect)],
-    })
-}
-
-pub(super) fn window(request: &Request, product: Option<&Product>, resolution: [u32; 2]) -> Result<Window> {
-    let full = Window::full(resolution);
-    if let Some([x0, y0, x1, y1]) = request.crop {
-        if x0 >= x1 || y0 >= y1 {
-            return Err(Error::usage(
-                "--crop",
-                format!("({x0}, {y0}) to ({x1}, {y1}) holds no pixel: X0,Y0,X1,Y1 are half-open, y down"),
-            ));
-        }
-        let limit = MAX_SIDE as i32;
-        if [x0, y0, x1, y1].iter().any(|v| v.abs() > limit) {
-            return Err(Error::usage("--crop", format!("reaches beyond ±{limit} pixels")));
-        }
-        return Ok(Window { x0, y0, x1, y1 });
-    }
-    let Some(product) = product else { return Ok(full) };
-    let [x_min, y_min, x_max, y_max] = product.data_window_ndc;
-    if ![x_min, y_min, x_max, y_max].iter().all(|v| v.is_finite() && v.abs() <= 16.0) {
-        return Err(Error::scene(format!("{}.dataWindowNDC", product.path), "must be finite and within ±16 images"));
-    }
-    // A pixel is inside when its centre is; NDC counts y from the bottom.
-    let first = |ndc: f64, side: u32| (ndc * f64::from(side) - 0.5).ceil() as i32;
-    let [w, h] = resolution;
-    let window =
-        Window { x0: first(x_min, w), y0: first(1.0 - y_max, h), x1: first(x_max, w), y1: first(1.0 - y_min, h) };
-    if window.area() == 0 {
-        return Err(Error::scene(
-            format!("{}.dataWindowNDC", product.path),
-            "holds no pixel: min must be less than max",
-        ));
-    }
-    Ok(window)
-}
 
 pub(super) fn samples(request: &Request, attributes: &Attributes<'_>) -> Result<SampleRange> {
     let total = match request.samples {

@@ -34,16 +34,15 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
     let camera = super::camera(scene, plan)?;
     let view = View::new(scene, camera.position);
     let media = Media::at(scene, plan.optics.reference, plan.optics.dispersion_scale)?;
-    let follower = Follower::new(&view);
+    let follower = Follower::of_camera(&view, &camera);
     let place = Sampler::new(plan.samples.total, plan.seed)?.sample(pixel, sample);
     let start = camera.ray(&place);
-    let medium = follower.start_medium(&media, start.time);
     let (mut log, mut segments) = (Vec::new(), Vec::new());
     let record = Record { steps: Some(&mut log), segments: Some(&mut segments) };
     let chain: Chain<SecondOrderColumns> = follower.follow(&start, &media, record, &mut Counters::default());
     let absorption = Coefficients::at(scene, [plan.optics.reference]);
 
-    let mut columns = SecondOrderColumns::start(&start, &medium);
+    let mut columns = SecondOrderColumns::start(&start, &chain.start_medium);
     let mut point = start.point;
     // The way from the last event: its medium, length and transmittance, and the transmittance so far. There is one more
     // segment than steps on a miss, and as many otherwise.
@@ -103,7 +102,7 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
         "wavelength_nm": plan.optics.reference.nanometers(),
         "camera": array(view.origin),
         "direction": array(start.direction),
-        "start_ior": medium.ior,
+        "start_ior": chain.start_medium.ior,
         "last_segment": if matches!(chain.end, End::Exhausted) { Value::Null } else { way(segments.len() - 1) },
         "events": events,
         "end": end,

@@ -11,14 +11,16 @@ use rayon::prelude::*;
 use super::description::{self, Array, Description, Document, Element, Placement};
 use super::manifest::Manifest;
 use super::material::{self, Context, Material, ScalarIor};
-use super::objects::{ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
+use super::meshes;
+use super::objects::{Appearance, ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
 use super::solids;
 use super::unroll::{self, Placed, Unrolled};
 use super::{Counts, Scene};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::geometry::{
-    Buffer, InstanceArray, Interpolation, Mesh, MeshReport, NamedPrimvar, Part, PolygonMesh, PrimvarView, Shape, Sphere,
+    Buffer, Deformation, InstanceArray, Interpolation, Mesh, MeshReport, NamedPrimvar, Part, PolygonMesh, PrimvarView,
+    Shape, Sphere, are_increasing,
 };
 
 /// Checks and compiles `description`.
@@ -47,7 +49,9 @@ pub fn build(description: Description) -> Result<Scene> {
     };
     let mut objects = Vec::with_capacity(singles.len());
     for single in &singles {
-        let Some((shape, PartIds { prim_id, material_ids, .. })) = compiler.part(single, &mut diagnostics)? else {
+        let Some((shape, PartIds { prim_id, material_ids, appearance, .. })) =
+            compiler.part(single, &mut diagnostics)?
+        else {
             continue;
         };
         let instance_id = match single.instance {
@@ -55,8 +59,8 @@ pub fn build(description: Description) -> Result<Scene> {
             Some(path) => instances.id(path, 1).ok_or_else(|| too_many(path))?,
         };
         let primvars = constants(single.placement, &primvars)?;
-        let world_from_object = single.transform.into();
-        objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars });
+        let world_from_object = single.transform.clone();
+        objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars, appearance });
     }
     let prototypes = prototypes
         .iter()
@@ -65,7 +69,7 @@ pub fn build(description: Description) -> Result<Scene> {
             for part in placed {
                 let Some((shape, part_ids)) = compiler.part(part, &mut diagnostics)? else { continue };
                 let part_ids = PartIds { primvars: constants(part.placement, &primvars)?, ..part_ids };
-                parts.push(Part { shape, place_from_object: part.transform.into() });
+                parts.push(Part { shape, place_from_object: part.transform.clone() });
                 ids.push(part_ids);
             }
             Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids)))
@@ -76,8 +80,8 @@ pub fn build(description: Description) -> Result<Scene> {
         let instances = InstanceArray {
             parts: Arc::clone(parts),
             places: array.places,
-            motion: None,
-            world_from_array: array.transform.into(),
+            motion: array.motion,
+            world_from_array: array.transform,
         };
         let parts = Arc::clone(ids);
         let placed = ObjectArray { instances, parts, first_id: array.first_id, indices: array.indices };
@@ -155,7 +159,9 @@ impl Compiler<'_> {
             self.triangles += report.triangles;
         }
         let material_ids = self.slots.entry(list).or_insert_with_key(|list| list.as_slice().into()).clone();
-        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids, primvars: None })))
+        let &Placement { hidden_from_camera, matte, .. } = placement;
+        let appearance = Appearance { hidden_from_camera, matte };
+        Ok(Some((Arc::clone(compiled), PartIds { prim_id, material_ids, primvars: None, appearance })))
     }
 }
 
@@ -217,7 +223,7 @@ fn build_shapes(
             }
         };
         if let (description::Shape::Mesh(mesh), Some(report)) = (shape, &report) {
-            report_mesh(mesh, report, diagnostics);
+            meshes::report(mesh, report, diagnostics);
         }
         let report = match report {
             None => {
@@ -237,19 +243,6 @@ fn build_shapes(
         shapes.push(Some((compiled, report)));
     }
     Ok(shapes)
-}
-
-fn report_mesh(mesh: &description::Mesh, report: &MeshReport, diagnostics: &mut Diagnostics) {
-    if report.degenerate > 0 {
-        diagnostics.warn(
-            "degenerate-faces",
-            &mesh.path,
-            format!("{} triangles without area are left out", report.degenerate),
-        );
-    }
-    if report.triangles == 0 {
-        diagnostics.warn("empty-mesh", &mesh.path, "it has no face with an area: nothing of it is seen");
-    }
 }
 
 /// What became of a shape.
@@ -304,8 +297,17 @@ fn compile_shape(description: &Description, shape: &description::Shape, names: &
                 uv_number: names.iter().position(|name| mesh.uv_name.as_ref() == Some(name)),
                 primvars: names.iter().map(|name| arrays.named_primvar(mesh, name)).collect::<Result<_>>()?,
                 subsets: &subsets,
+                subdivision: meshes::subdivision(&arrays, mesh, counts)?,
             };
-            let mesh = Mesh::from_polygons(&polygons);
+            let normals = polygons.normals.as_ref().map(|normals| normals.values.len());
+            let deformation = match &mesh.motion {
+                Some(motion) => match arrays.deformation(motion, polygons.points.len(), normals)? {
+                    Ok(deformation) => Some(deformation),
+                    Err(problem) => return Ok(Err(problem)),
+                },
+                None => None,
+            };
+            let mesh = Mesh::deforming(&polygons, deformation);
             Ok(mesh.map(|(mesh, report)| Built::Shape(Arc::new(Shape::Mesh(mesh)), Some(report))))
         }
         other => Ok(solids::compile(other).map(|compiled| solid(compiled.map(Shape::Solid)))),
@@ -346,7 +348,7 @@ impl<'a> NamedArrays<'a> {
     }
 
     /// Shares the memory of a float array.
-    fn buffer<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
+    pub(super) fn buffer<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
         self.share(name, Element::F32, columns)
     }
 
@@ -366,7 +368,38 @@ impl<'a> NamedArrays<'a> {
             .map_err(|problem| Error::scene(self.place, format!("array '{name}': {problem}")))
     }
 
-    fn integers(&self, name: &str) -> Result<&'a [i32]> {
+    /// Points and normals at other times: of a mesh with so many points, and floats in its normals. What is only broken (not
+    /// what is missing from the file) is the inner error.
+    fn deformation(
+        &self,
+        motion: &description::MeshMotion,
+        points: usize,
+        normals: Option<usize>,
+    ) -> Result<Result<Deformation>> {
+        let description::MeshMotion { times, points: names, normals: normal_names } = motion;
+        let broken = |problem: &str| Ok(Err(Error::scene(self.place, problem)));
+        if !are_increasing(times) || times.len() > unroll::MAX_TIMES {
+            return broken("the times of its motion do not increase");
+        }
+        if names.len() != times.len() || ![0, times.len()].contains(&normal_names.len()) {
+            return broken("its motion needs points, and normals if any, for each of its times");
+        }
+        let moved: Vec<Buffer<[f32; 3]>> = names.iter().map(|name| self.buffer(name, 3)).collect::<Result<_>>()?;
+        if moved.iter().any(|moved| moved.len() != points) {
+            return broken("its motion has another number of points at another time");
+        }
+        if moved.par_iter().any(|moved| moved.iter().flatten().any(|v| !v.is_finite())) {
+            return broken("its motion has a point that is not finite");
+        }
+        let turned: Vec<Buffer<f32>> = normal_names.iter().map(|name| self.buffer(name, 3)).collect::<Result<_>>()?;
+        if turned.iter().any(|turned| Some(turned.len()) != normals) {
+            return broken("its motion has another number of normals at another time");
+        }
+        let normals = (!turned.is_empty()).then_some(turned);
+        Ok(Ok(Deformation { times: times.clone(), points: moved, normals }))
+    }
+
+    pub(super) fn integers(&self, name: &str) -> Result<&'a [i32]> {
         let array = self.get(name, Element::I32, 1)?;
         // An empty array may begin anywhere.
         if array.bytes.is_empty() {

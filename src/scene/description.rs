@@ -130,6 +130,9 @@ pub struct Stage {
     /// Frames per second of the stage.
     #[serde(default)]
     pub frames_per_second: Option<f64>,
+    /// The interval about the frame in which motion was looked for; absent if it was not.
+    #[serde(default)]
+    pub motion: Option<[f64; 2]>,
 }
 
 /// A shape in its object space.
@@ -288,6 +291,80 @@ pub struct Mesh {
     /// Faces with materials of their own. Faces in none have the placement's material.
     #[serde(default)]
     pub subsets: Vec<Subset>,
+    /// How it is the control mesh of a subdivision surface; a polygon mesh if absent.
+    #[serde(default)]
+    pub subdivision: Option<Subdivision>,
+    /// Where the points are at other times than the frame; they do not move if absent.
+    #[serde(default)]
+    pub motion: Option<MeshMotion>,
+}
+
+/// How a mesh is subdivided.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Subdivision {
+    /// `catmullClark`, `loop` or `bilinear`.
+    pub scheme: String,
+    /// How often faces are divided; 0 shows the control mesh. The renderer's default if absent.
+    #[serde(default)]
+    pub level: Option<u32>,
+    /// `none`, `edgeOnly` or `edgeAndCorner`; the last if absent.
+    #[serde(default)]
+    pub interpolate_boundary: Option<String>,
+    /// `none`, `cornersOnly`, `cornersPlus1`, `cornersPlus2`, `boundaries` or `all`; `cornersPlus1` if absent.
+    #[serde(default)]
+    pub face_varying_linear_interpolation: Option<String>,
+    /// `catmullClark` or `smooth`; the first if absent.
+    #[serde(default)]
+    pub triangle_subdivision_rule: Option<String>,
+    /// Array i32: points of all creases, one crease after the other.
+    #[serde(default)]
+    pub crease_indices: Option<String>,
+    /// Array i32: points of each crease.
+    #[serde(default)]
+    pub crease_lengths: Option<String>,
+    /// Array f32: one a crease, or one for each edge of every crease.
+    #[serde(default)]
+    pub crease_sharpnesses: Option<String>,
+    /// Array i32: points that are sharp.
+    #[serde(default)]
+    pub corner_indices: Option<String>,
+    /// Array f32: one a corner.
+    #[serde(default)]
+    pub corner_sharpnesses: Option<String>,
+}
+
+/// Transforms at other times than the frame, whose own stands beside them: linear between the samples, held beyond.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Motion {
+    /// In frames (time codes of the stage) from the frame, increasing.
+    pub times: Vec<f64>,
+    /// One for each time.
+    pub transforms: Vec<[f64; 16]>,
+}
+
+/// Points of a mesh at other times than the frame: linear between the samples, held beyond.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshMotion {
+    /// In frames from the frame, increasing.
+    pub times: Vec<f64>,
+    /// One array for each time, as [`Mesh::points`].
+    pub points: Vec<String>,
+    /// One array for each time, as the values of [`Mesh::normals`]; none if the normals do not move.
+    #[serde(default)]
+    pub normals: Vec<String>,
+}
+
+/// Transforms of instances at other times than the frame: linear between the samples, held beyond.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstancesMotion {
+    /// In frames from the frame, increasing.
+    pub times: Vec<f64>,
+    /// One array for each time, as [`Instances::transforms`].
+    pub transforms: Vec<String>,
 }
 
 /// Values over a mesh.
@@ -345,6 +422,12 @@ pub struct Instances {
     pub indices: Option<String>,
     /// Elements of the instancer, hidden ones and those of other prototypes included.
     pub count: usize,
+    /// The surrounding group's space from the instancer's at other times.
+    #[serde(default)]
+    pub motion: Option<Motion>,
+    /// The instancer's space from the prototype's at other times.
+    #[serde(default)]
+    pub places_motion: Option<InstancesMotion>,
 }
 
 /// A shape or a group, placed.
@@ -358,6 +441,9 @@ pub struct Placement {
     /// Parent space from object space; identity if absent.
     #[serde(default)]
     pub transform: Option<[f64; 16]>,
+    /// Parent space from object space at other times than the frame; it does not move if absent.
+    #[serde(default)]
+    pub motion: Option<Motion>,
     /// Path of the instance this belongs to; the `instance_id`.
     #[serde(default)]
     pub instance: Option<String>,
@@ -371,6 +457,12 @@ pub struct Placement {
     /// name without `primvars:`, one to four numbers.
     #[serde(default)]
     pub primvars: BTreeMap<String, Vec<f64>>,
+    /// Camera rays pass through it unseen; rays that were refracted or reflected meet it.
+    #[serde(default)]
+    pub hidden_from_camera: bool,
+    /// It holds out what is behind it: nothing of it shows, and alpha is 0 there.
+    #[serde(default)]
+    pub matte: bool,
     /// Lit and shaded from both sides; for glass the sides are decided by the normal alone.
     #[serde(default)]
     pub double_sided: bool,
@@ -430,7 +522,7 @@ pub struct Shader {
 }
 
 /// A camera as authored (UsdGeomCamera: apertures and focal length in tenths of a stage unit).
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
     /// Prim path; empty for a camera that the bridge framed by itself.
@@ -454,18 +546,46 @@ pub struct Camera {
     /// Near and far, stage units.
     #[serde(default)]
     pub clipping_range: Option<[f64; 2]>,
+    /// Whether `clipping_range` is authored, not a fallback.
+    #[serde(default)]
+    pub clipping_authored: bool,
+    /// Planes (a, b, c, d): what is seen has a x + b y + c z + d ≥ 0 in camera space.
+    #[serde(default)]
+    pub clipping_planes: Vec<[f64; 4]>,
     /// 0 for a pinhole.
     #[serde(default)]
     pub f_stop: f64,
     /// Stage units.
     #[serde(default)]
     pub focus_distance: f64,
+    /// What the sensor makes of light; nothing of it is applied to derivatives.
+    #[serde(default)]
+    pub exposure: Option<Exposure>,
     /// Shutter opening, frames relative to the time code.
     #[serde(default)]
     pub shutter_open: f64,
     /// Shutter closing.
     #[serde(default)]
     pub shutter_close: f64,
+    /// The transform at other times than the frame.
+    #[serde(default)]
+    pub motion: Option<Motion>,
+}
+
+/// Exposure of a camera (UsdGeomCamera: `exposure`, `exposure:time` …).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Exposure {
+    /// Compensation, powers of 2.
+    pub stops: f64,
+    /// Seconds.
+    pub time: f64,
+    /// Speed of the sensor.
+    pub iso: f64,
+    /// The f-number that lets light in; that of the lens' blur is [`Camera::f_stop`].
+    pub f_stop: f64,
+    /// Of the sensor.
+    pub responsivity: f64,
 }
 
 /// Render settings with their products flattened by the rules of UsdRenderComputeSpec.

@@ -8,6 +8,7 @@ pub mod description;
 pub mod file;
 mod manifest;
 pub mod material;
+mod meshes;
 mod objects;
 mod solids;
 mod unroll;
@@ -20,7 +21,7 @@ use crate::error::Result;
 use description::{Description, Document};
 pub use manifest::Manifest;
 use material::Material;
-pub use objects::{ConstantPrimvars, Object, ObjectArray, ObjectIds, Objects, PartIds};
+pub use objects::{Appearance, ConstantPrimvars, Object, ObjectArray, ObjectIds, Objects, PartIds};
 
 /// Everything that can be rendered, checked.
 #[derive(Clone, Debug)]

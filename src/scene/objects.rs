@@ -22,6 +22,17 @@ pub struct Object {
     pub material_ids: Arc<[u32]>,
     /// Constant primvars.
     pub primvars: Option<ConstantPrimvars>,
+    /// How cameras see it.
+    pub appearance: Appearance,
+}
+
+/// How cameras see an object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Appearance {
+    /// Camera rays pass through it unseen.
+    pub hidden_from_camera: bool,
+    /// Nothing of it shows, and alpha is 0 there.
+    pub matte: bool,
 }
 
 /// Constant primvars by the number that they are looked up by.
@@ -36,6 +47,8 @@ pub struct PartIds {
     pub material_ids: Arc<[u32]>,
     /// Constant primvars.
     pub primvars: Option<ConstantPrimvars>,
+    /// How cameras see it.
+    pub appearance: Appearance,
 }
 
 /// Shapes placed by an array of transforms.
@@ -60,6 +73,8 @@ pub struct ObjectIds<'a> {
     pub instance_id: u32,
     /// Material per slot.
     pub material_ids: &'a [u32],
+    /// How cameras see it.
+    pub appearance: Appearance,
 }
 
 /// All placed shapes, numbered: single ones first, then array by array, place by place, part by part. The number is the
@@ -69,6 +84,7 @@ pub struct Objects {
     singles: Vec<Object>,
     arrays: Vec<ObjectArray>,
     numbering: Numbering,
+    hides_some: bool,
 }
 
 impl Objects {
@@ -76,7 +92,14 @@ impl Objects {
     pub(super) fn new(singles: Vec<Object>, arrays: Vec<ObjectArray>) -> Self {
         let sizes = arrays.iter().map(|a| (a.instances.places.len(), a.instances.parts.len()));
         let numbering = Numbering::new(singles.len(), sizes);
-        Self { singles, arrays, numbering }
+        let parts = arrays.iter().flat_map(|a| a.parts.iter()).map(|part| part.appearance);
+        let hides_some = singles.iter().map(|o| o.appearance).chain(parts).any(|a| a.hidden_from_camera);
+        Self { singles, arrays, numbering, hides_some }
+    }
+
+    /// Whether some are hidden from the camera.
+    pub fn hides_some(&self) -> bool {
+        self.hides_some
     }
 
     /// How many there are.
@@ -146,14 +169,14 @@ impl Objects {
     pub fn ids(&self, index: u32) -> ObjectIds<'_> {
         match self.numbering.locate(index) {
             Location::Single(i) => {
-                let Object { prim_id, instance_id, ref material_ids, .. } = self.singles[i];
-                ObjectIds { prim_id, instance_id, material_ids }
+                let Object { prim_id, instance_id, ref material_ids, appearance, .. } = self.singles[i];
+                ObjectIds { prim_id, instance_id, material_ids, appearance }
             }
             Location::InArray { array, place, part } => {
                 let array = &self.arrays[array];
                 let element = array.indices.as_ref().map_or(place as u32, |indices| indices[place] as u32);
-                let PartIds { prim_id, ref material_ids, .. } = array.parts[part];
-                ObjectIds { prim_id, instance_id: array.first_id + element, material_ids }
+                let PartIds { prim_id, ref material_ids, appearance, .. } = array.parts[part];
+                ObjectIds { prim_id, instance_id: array.first_id + element, material_ids, appearance }
             }
         }
     }

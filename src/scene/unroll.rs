@@ -10,21 +10,28 @@ use glam::{DAffine3, DMat4};
 use rayon::prelude::*;
 
 use super::builder::NamedArrays;
-use super::description::{Description, Document, Instances, Placement, Target};
+use super::description::{Description, Document, Instances, InstancesMotion, Motion, Placement, Target};
 use super::manifest::{self, Manifest};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::geometry::{Buffer, affine, is_invertible};
+use crate::geometry::{Buffer, PlaceSamples, Pose, Track, affine, are_increasing, is_invertible};
 
 /// More objects than this are refused. One that an array places takes about 150 bytes, and 400 while the tree is built, its
 /// transform included (`benches/instances.py`): these take 10 GB, and 27 for a while.
 const MAX_OBJECTS: u64 = 1 << 26;
 
+/// Samples of one motion; more are no motion but damage.
+pub(crate) const MAX_TIMES: usize = 1024;
+/// Samples of motion within motion.
+const MAX_NESTED_TIMES: usize = 4 * MAX_TIMES;
+/// Transforms that all single placements have as samples: 1.6 GB of them.
+const MAX_SAMPLES: usize = 1 << 24;
+
 /// A shape placed by itself.
 pub(super) struct Placed<'a> {
     pub(super) shape: usize,
     /// The world, or the prototype, from object space.
-    pub(super) transform: DAffine3,
+    pub(super) transform: Pose,
     pub(super) placement: &'a Placement,
     pub(super) instance: Option<&'a str>,
 }
@@ -34,8 +41,9 @@ pub(super) struct PlacedArray {
     /// Index into [`Unrolled::prototypes`].
     pub(super) prototype: usize,
     pub(super) places: Buffer<[f64; 12]>,
+    pub(super) motion: Option<PlaceSamples>,
     /// The world from the array's space.
-    pub(super) transform: DAffine3,
+    pub(super) transform: Pose,
     /// `instance_id` of the instancer's element 0, and which element stands at each place.
     pub(super) first_id: u32,
     pub(super) indices: Option<Buffer<i32>>,
@@ -55,11 +63,11 @@ pub(super) struct Unrolled<'a> {
 type Key = (usize, usize);
 
 /// An array within a group that is unrolled.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Nested<'a> {
     key: Key,
     instances: &'a Instances,
-    transform: DAffine3,
+    transform: Pose,
 }
 
 /// An array that is still to be placed.
@@ -89,7 +97,8 @@ struct Named {
 /// Unrolls the groups of `description`, which are [checked](check_groups).
 pub(super) fn unroll<'a>(description: &'a Description, diagnostics: &mut Diagnostics) -> Result<Unrolled<'a>> {
     let document = &description.document;
-    let (singles, nested) = flatten(document, document.root, diagnostics);
+    let mut samples = Samples { left: MAX_SAMPLES };
+    let (singles, nested) = flatten(document, document.root, &mut samples, diagnostics)?;
     let mut unroller = Unroller {
         description,
         diagnostics,
@@ -100,6 +109,7 @@ pub(super) fn unroll<'a>(description: &'a Description, diagnostics: &mut Diagnos
         arrays: Vec::new(),
         instances: Manifest::default(),
         left_out: Vec::new(),
+        samples,
     };
     let mut level: Vec<_> = nested.into_iter().map(|nested| Open { nested, around: 0, ordinal: 0 }).collect();
     while !level.is_empty() {
@@ -134,25 +144,29 @@ struct Unroller<'a, 'd> {
     arrays: Vec<PlacedArray>,
     instances: Manifest,
     left_out: Vec<(&'a str, usize)>,
+    samples: Samples,
 }
 
 impl<'a> Unroller<'a, '_> {
     /// Places an array, and puts what its prototype nests on `next`.
     fn place(&mut self, open: &Open<'a>, next: &mut Vec<Open<'a>>) -> Result<()> {
-        let Nested { key, instances, transform } = open.nested;
+        let Nested { key, instances, ref transform } = open.nested;
         let arrays = NamedArrays { description: self.description, place: &instances.path };
         let places: Buffer<[f64; 12]> = arrays.doubles(&instances.transforms, 12)?;
         if places.is_empty() {
             return Ok(());
         }
+        let motion = instances.places_motion.as_ref().map(|motion| place_samples(motion, &arrays)).transpose()?;
         let indices = instances.indices.as_deref().map(|name| arrays.indices(name)).transpose()?;
-        let prototype = self.prototype(instances.group);
+        let prototype = self.prototype(instances.group)?;
         let named = self.name(open.around, key, instances, places.len(), indices.as_deref())?;
         let elements = instances.count as u64;
         let Prototype { parts, nested } = &self.prototypes[prototype];
-        for &inner in nested {
-            for (place, rows) in places.iter().enumerate() {
-                let nested = Nested { transform: transform * affine(rows) * inner.transform, ..inner };
+        for inner in nested {
+            for place in 0..places.len() {
+                let pose = transform.compose(&place_pose(&places, motion.as_ref(), place)).compose(&inner.transform);
+                self.samples.count(&pose, &instances.path)?;
+                let nested = Nested { transform: pose, ..inner.clone() };
                 let ordinal = open.ordinal * places.len() as u64 + place as u64;
                 next.push(Open { nested, around: named.around, ordinal });
             }
@@ -160,11 +174,20 @@ impl<'a> Unroller<'a, '_> {
         if parts.is_empty() {
             return Ok(());
         }
-        let singular = places
-            .par_iter()
-            .map(|rows| {
-                let place = transform * affine(rows);
-                parts.iter().filter(|part| !is_invertible(&(place * part.transform))).count()
+        let singular = (0..places.len())
+            .into_par_iter()
+            .map(|place| {
+                let is_nowhere = |part: &&Placed<'_>| match motion.is_none() && !transform.is_moving() {
+                    // Moving or not, nearly all are somewhere at the frame.
+                    true if !part.transform.is_moving() => {
+                        !is_invertible(&(*transform.frame() * affine(&places[place]) * *part.transform.frame()))
+                    }
+                    _ => {
+                        let pose = transform.compose(&place_pose(&places, motion.as_ref(), place));
+                        !is_somewhere(&pose.compose(&part.transform))
+                    }
+                };
+                parts.iter().filter(is_nowhere).count()
             })
             .sum();
         if singular > 0 {
@@ -175,19 +198,20 @@ impl<'a> Unroller<'a, '_> {
         }
         // The manifest has room for all combinations, so that this one fits.
         let first_id = named.first_id + (open.ordinal * elements) as u32;
-        self.arrays.push(PlacedArray { prototype, places, transform, first_id, indices });
+        let transform = transform.clone();
+        self.arrays.push(PlacedArray { prototype, places, motion, transform, first_id, indices });
         Ok(())
     }
 
     /// The prototype that is the group `group`.
-    fn prototype(&mut self, group: usize) -> usize {
+    fn prototype(&mut self, group: usize) -> Result<usize> {
         if let Some(&prototype) = self.by_group.get(&group) {
-            return prototype;
+            return Ok(prototype);
         }
-        let (parts, nested) = flatten(&self.description.document, group, self.diagnostics);
+        let (parts, nested) = flatten(&self.description.document, group, &mut self.samples, self.diagnostics)?;
         self.prototypes.push(Prototype { parts, nested });
         self.by_group.insert(group, self.prototypes.len() - 1);
-        self.prototypes.len() - 1
+        Ok(self.prototypes.len() - 1)
     }
 
     /// Names an array within those around it. Several arrays of one instancer, one for each prototype, share identifiers.
@@ -239,38 +263,43 @@ impl<'a> Unroller<'a, '_> {
 fn flatten<'a>(
     document: &'a Document,
     group: usize,
+    samples: &mut Samples,
     diagnostics: &mut Diagnostics,
-) -> (Vec<Placed<'a>>, Vec<Nested<'a>>) {
+) -> Result<(Vec<Placed<'a>>, Vec<Nested<'a>>)> {
     struct Frame<'a> {
         group: usize,
         next: usize,
-        transform: DAffine3,
+        transform: Pose,
         instance: Option<&'a str>,
     }
     let (mut placed, mut nested) = (Vec::new(), Vec::new());
     // An explicit stack: a hostile file may nest deeper than the thread's own.
-    let mut stack = vec![Frame { group, next: 0, transform: DAffine3::IDENTITY, instance: None }];
+    let mut stack = vec![Frame { group, next: 0, transform: DAffine3::IDENTITY.into(), instance: None }];
     while let Some(mut frame) = stack.pop() {
         let Some(item) = document.groups[frame.group].items.get(frame.next) else {
             for (i, instances) in document.groups[frame.group].instances.iter().enumerate() {
-                let Some(local) = place_of(instances.transform.as_ref(), &instances.path, diagnostics) else {
+                let Instances { path, transform, motion, .. } = instances;
+                let Some(local) = pose_of(transform.as_ref(), motion.as_ref(), path, diagnostics) else {
                     continue;
                 };
-                nested.push(Nested { key: (frame.group, i), instances, transform: frame.transform * local });
+                let transform = frame.transform.compose(&local);
+                samples.count(&transform, path)?;
+                nested.push(Nested { key: (frame.group, i), instances, transform });
             }
             continue;
         };
         frame.next += 1;
-        let Some(local) = place_of(item.transform.as_ref(), &item.path, diagnostics) else {
+        let Some(local) = pose_of(item.transform.as_ref(), item.motion.as_ref(), &item.path, diagnostics) else {
             stack.push(frame);
             continue;
         };
-        let transform = frame.transform * local;
+        let transform = frame.transform.compose(&local);
+        samples.count(&transform, &item.path)?;
         let instance = item.instance.as_deref().or(frame.instance);
         stack.push(frame);
         match item.target {
             Target::Group(child) => stack.push(Frame { group: child, next: 0, transform, instance }),
-            Target::Shape(_) if !is_invertible(&transform) => diagnostics.warn(
+            Target::Shape(_) if !is_somewhere(&transform) => diagnostics.warn(
                 "singular-transform",
                 &item.path,
                 "its transform flattens it to nothing: it is left out",
@@ -278,7 +307,65 @@ fn flatten<'a>(
             Target::Shape(shape) => placed.push(Placed { shape, transform, placement: item, instance }),
         }
     }
-    (placed, nested)
+    Ok((placed, nested))
+}
+
+/// Transforms of moving things that are still allowed: a hostile file may nest motion in motion.
+struct Samples {
+    left: usize,
+}
+
+impl Samples {
+    fn count(&mut self, pose: &Pose, path: &str) -> Result<()> {
+        let samples = pose.times().len();
+        if samples > MAX_NESTED_TIMES || samples > self.left {
+            let problem = "moves within what moves, with too many samples together: sample the motion less often";
+            return Err(Error::scene(path, problem));
+        }
+        self.left -= samples;
+        Ok(())
+    }
+}
+
+/// Whether it is not flat at the frame and at all samples.
+fn is_somewhere(pose: &Pose) -> bool {
+    is_invertible(pose.frame()) || pose.times().iter().any(|&time| is_invertible(&pose.at(time)))
+}
+
+/// Where a place of an array is.
+fn place_pose(places: &[[f64; 12]], motion: Option<&PlaceSamples>, place: usize) -> Pose {
+    let frame = affine(&places[place]);
+    let Some(motion) = motion else { return frame.into() };
+    let transforms = motion.places.iter().map(|places| affine(&places[place])).collect();
+    Track::new(motion.times.clone(), transforms).map_or(frame.into(), |track| Pose::moving(frame, track))
+}
+
+fn place_samples(motion: &InstancesMotion, arrays: &NamedArrays<'_>) -> Result<PlaceSamples> {
+    let places = motion.transforms.iter().map(|name| arrays.doubles(name, 12)).collect::<Result<_>>()?;
+    Ok(PlaceSamples { times: motion.times.clone(), places })
+}
+
+/// A transform with its motion; `None` with a warning if it is none. A motion that is none is warned of and left out.
+fn pose_of(
+    matrix: Option<&[f64; 16]>,
+    motion: Option<&Motion>,
+    path: &str,
+    diagnostics: &mut Diagnostics,
+) -> Option<Pose> {
+    let frame = place_of(matrix, path, diagnostics)?;
+    let Some(motion) = motion else { return Some(frame.into()) };
+    let is_affine =
+        |m: &[f64; 16]| m.iter().all(|v| v.is_finite()) && [m[3], m[7], m[11], m[15] - 1.0].iter().all(|&v| v == 0.0);
+    let transforms: Vec<_> = (motion.transforms.iter().filter(|m| is_affine(m)))
+        .map(|m| DAffine3::from_mat4(DMat4::from_cols_array(m)))
+        .collect();
+    let track = if motion.times.len() <= MAX_TIMES { Track::new(motion.times.clone(), transforms) } else { None };
+    if track.is_none() {
+        let problem =
+            "its motion is broken (as many affine transforms as increasing times are needed): it stands still";
+        diagnostics.warn("broken-motion", path, problem);
+    }
+    Some(track.map_or(frame.into(), |track| Pose::moving(frame, track)))
 }
 
 /// USD's row-vector matrix as an affine map of column vectors; `None` with a warning if it is none.
@@ -346,12 +433,24 @@ pub(super) fn check_groups(description: &Description) -> Result<()> {
 
 /// The arrays fit each other.
 fn check_instances(description: &Description, instances: &Instances) -> Result<()> {
-    let Instances { path, count, .. } = instances;
+    let Instances { path, count, places_motion, .. } = instances;
     let arrays = NamedArrays { description, place: path };
     let places = arrays.doubles::<[f64; 12]>(&instances.transforms, 12)?.len();
     let damaged = |problem: String| Err(Error::scene(path, format!("{problem}: export the stage again")));
     if *count > i32::MAX as usize || path.contains(['[', ']']) {
         return damaged(format!("has {count} elements, which is no instancer"));
+    }
+    if let Some(motion) = places_motion {
+        let InstancesMotion { times, transforms } = motion;
+        if !are_increasing(times) || times.len() != transforms.len() || times.len() > MAX_TIMES {
+            return damaged(format!("has {} transforms at {} times that must increase", transforms.len(), times.len()));
+        }
+        for name in transforms {
+            let moved = arrays.doubles::<[f64; 12]>(name, 12)?.len();
+            if moved != places {
+                return damaged(format!("has {moved} transforms at another time for {places}"));
+            }
+        }
     }
     let Some(name) = &instances.indices else {
         return if places <= *count {

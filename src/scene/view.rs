@@ -123,6 +123,16 @@ impl<'a> View<'a> {
         self.aggregate.coincident(ray, departures, |object| self.has_backing(object))
     }
 
+    /// Whether rays of the camera itself pass through the surface at `hit`.
+    pub fn is_hidden_from_camera(&self, hit: &Hit) -> bool {
+        self.scene.objects.hides_some() && self.scene.objects.ids(hit.instance).appearance.hidden_from_camera
+    }
+
+    /// Whether some surface of a glass may lie in the box `[min, max]`, in render space, at any time.
+    pub fn has_glass_in(&self, search: [DVec3; 2]) -> bool {
+        self.aggregate.has_surface_in(search, |object| self.is_glass(object))
+    }
+
     /// `material_id` at `hit`, 0 for none.
     pub fn material_id(&self, hit: &Hit) -> u32 {
         let ids = self.scene.objects.ids(hit.instance).material_ids;

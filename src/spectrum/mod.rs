@@ -1,10 +1,14 @@
-//! Wavelengths, spectral lines, responses, an illuminant, colours made spectra.
+//! Wavelengths, spectral lines, the observer, illuminants, colour spaces, colours made spectra.
 //!
 //! A wavelength is a [`Wavelength`], never a bare number: nanometres inside, micrometres for the dispersion laws.
 
+pub mod blackbody;
+pub mod color;
 pub mod illuminant;
 pub mod lines;
+pub mod observer;
 pub mod response;
+mod tables;
 pub mod uplift;
 mod wavelength;
 

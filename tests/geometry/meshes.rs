@@ -10,11 +10,17 @@ use crate::shapes::*;
 fn problem(change: impl FnOnce(&mut abbe::geometry::PolygonMesh<'_>)) -> String {
     let mut cube = polygons(&cube_points(1.0), &CUBE_COUNTS, &CUBE_INDICES);
     change(&mut cube);
-    Mesh::from_polygons(&cube).expect_err("an error").to_string()
+    match Mesh::from_polygons(&cube) {
+        Err(error) => error.to_string(),
+        Ok((_, report)) => {
+            let [problem] = report.problems.as_slice() else { panic!("{:?}", report.problems) };
+            format!("/Mesh.{}: {}", problem.attribute, problem.problem)
+        }
+    }
 }
 
 #[test]
-fn broken_arrays_give_errors_that_name_the_place() {
+fn broken_arrays_are_named_and_broken_primvars_left_out() {
     let normals = |values: Vec<f32>, interpolation| {
         Some(PrimvarView { values: Buffer::from_vec(values), indices: None, interpolation })
     };

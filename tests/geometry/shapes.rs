@@ -19,6 +19,7 @@ pub(crate) fn polygons<'a>(points: &[[f32; 3]], counts: &'a [i32], indices: &'a 
         uv_number: None,
         primvars: Vec::new(),
         subsets: &[],
+        subdivision: None,
     }
 }
 

@@ -151,6 +151,13 @@ def _check_arrays(document, arrays):
                 if primvar.get("indices") is not None:
                     array(primvar["indices"], np.int32, 1, where)
                 assert primvar["interpolation"] in ("constant", "uniform", "varying", "vertex", "faceVarying")
+        subdivision = mesh.get("subdivision") or {}
+        for name in ("crease_indices", "crease_lengths", "corner_indices"):
+            if name in subdivision:
+                array(subdivision[name], np.int32, 1, where)
+        for name in ("crease_sharpnesses", "corner_sharpnesses"):
+            if name in subdivision:
+                array(subdivision[name], np.float32, 1, where)
         for subset in mesh.get("subsets", []):
             array(subset["faces"], np.int32, 1, where)
     for index, texture in enumerate(document.get("textures", [])):

@@ -110,11 +110,19 @@ def test_only_face_subsets_of_the_material_family_count(geometry):
     assert warned(geometry, "unsupported-subset")[0]["places"] == ["</World/Polygons/points>"]
 
 
-def test_a_subdivision_surface_is_its_control_mesh_without_normals(geometry):
-    assert "normals" not in shape(geometry, "/World/Subdivision")["mesh"]
-    (warning,) = warned(geometry, "subdivision-control-mesh")
-    assert warning["places"] == ["</World/Subdivision>"]
-    assert "catmullClark" in warning["message"] and "normals" in warning["message"]
+def test_a_subdivision_surface_has_no_authored_normals(geometry):
+    mesh = shape(geometry, "/World/Subdivision")["mesh"]
+    assert "normals" not in mesh
+    # USD's own fallbacks, forwarded; the level is the renderer's to choose.
+    assert mesh["subdivision"] == {
+        "scheme": "catmullClark",
+        "interpolate_boundary": "edgeAndCorner",
+        "face_varying_linear_interpolation": "cornersPlus1",
+        "triangle_subdivision_rule": "catmullClark",
+    }
+    (warning,) = warned(geometry, "ignored-normals")
+    assert warning["places"] == ["</World/Subdivision>.normals"]
+    assert "subdivision" not in shape(geometry, "/World/Plain")["mesh"]
 
 
 def test_points_and_transforms_are_those_of_the_frame(geometry):

@@ -61,6 +61,7 @@ SCHEMAS = {
             "abbe:lens:back:semiDiameter": ("double", VARYING, 0.0, None),
         },
     ),
+    "AbbeSubdivisionAPI": ("Mesh", {"abbe:subdivision:level": ("int", UNIFORM, 2, None)}),
     "AbbeRenderSettingsAPI": (
         "RenderSettings",
         {
@@ -99,7 +100,7 @@ if len(sys.argv) > 1:
 stage = Usd.Stage.CreateInMemory()
 registry = Usd.SchemaRegistry()
 found = {}
-for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeLensAPI", "Mesh"),
+for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeLensAPI", "Mesh"), ("AbbeSubdivisionAPI", "Mesh"),
                      ("AbbeRenderSettingsAPI", "RenderSettings"), ("AbbeRenderVarAPI", "RenderVar")):
     definition = registry.FindAppliedAPIPrimDefinition(name)
     if definition is None:

@@ -41,6 +41,7 @@ impl Stagehand {
                 up_axis: "Y".into(),
                 time_code: None,
                 frames_per_second: Some(24.0),
+                motion: None,
             },
             shapes: vec![],
             groups: vec![Group { path: "/".into(), items: vec![], instances: vec![] }],
@@ -161,6 +162,8 @@ impl Stagehand {
             uv_name: None,
             primvars: BTreeMap::new(),
             subsets: vec![],
+            subdivision: None,
+            motion: None,
         }));
         self.place(path, transform, material);
     }
@@ -181,11 +184,14 @@ impl Stagehand {
             path: path.into(),
             target: Target::Shape(shape),
             transform: Some(transform.to_cols_array()),
+            motion: None,
             instance: None,
             material,
             subset_materials: vec![],
             primvars: Default::default(),
             double_sided: false,
+            hidden_from_camera: false,
+            matte: false,
         });
     }
 
@@ -224,14 +230,8 @@ impl Stagehand {
             projection: "perspective".into(),
             horizontal_aperture: 36.0,
             vertical_aperture: 24.0,
-            horizontal_aperture_offset: 0.0,
-            vertical_aperture_offset: 0.0,
             focal_length: 35.0,
-            clipping_range: None,
-            f_stop: 0.0,
-            focus_distance: 0.0,
-            shutter_open: 0.0,
-            shutter_close: 0.0,
+            ..Camera::default()
         });
     }
 

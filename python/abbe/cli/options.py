@@ -131,6 +131,12 @@ def add_stage(parser: argparse.ArgumentParser, time: bool = True, scene_file: bo
         default="warn",
         help="what a missing layer or reference is; warn unless given",
     )
+    group.add_argument(
+        "--complexity",
+        "-c",
+        choices=("low", "medium", "high", "veryhigh"),
+        help="divide subdivision surfaces 0, 1, 2 or 3 times; 2 unless given, less for very fine ones",
+    )
 
 
 def add_scalar_ior(group: argparse._ArgumentGroup) -> None:
@@ -259,6 +265,7 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
                 mask=args.mask,
                 payloads=args.payloads,
                 missing=args.missing,
+                complexity=args.complexity,
                 scalar_ior=args.scalar_ior,
                 strict=args.strict,
             )
@@ -274,6 +281,7 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
         "--session-layer": args.session_layer is not None,
         "--mask": bool(args.mask),
         "--payloads": args.payloads != "all",
+        "--complexity": args.complexity is not None,
         "--scalar-ior": args.scalar_ior is not None,
     }
     for option, is_given in given.items():

@@ -33,6 +33,7 @@ def describe(
     mask: Sequence[str] = (),
     payloads: str = "all",
     missing: str = "warn",
+    complexity: str | None = None,
     scalar_ior: str | None = None,
     strict: bool = False,
 ) -> Description:
@@ -53,6 +54,8 @@ def describe(
     mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
     payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
     missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+    complexity : ``"low"``, ``"medium"``, ``"high"`` or ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
+        ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
     scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
     strict : a stage without a camera is an error
 
@@ -88,6 +91,7 @@ def describe(
         mask=mask,
         payloads=payloads,
         missing=missing,
+        complexity=complexity,
         strict=strict,
     )
     if scalar_ior is not None:

@@ -17,6 +17,7 @@ from ._pxr import Usd, UsdGeom
 from .description import Array, ArrayTable, BrokenError, Diagnostics
 from .lenses import lens_bounds, read_lens
 from .solids import read_solid, solid_bounds
+from .subdivision import SubdivisionReader
 from .values import float_array, int_array, place, read
 
 __all__ = ["ShapeReader"]
@@ -37,10 +38,11 @@ def _extent(points: Array) -> Bounds:
 class ShapeReader:
     """Reads shapes, each prototype's once."""
 
-    def __init__(self, time: Any, diagnostics: Diagnostics) -> None:
+    def __init__(self, time: Any, diagnostics: Diagnostics, level: int | None = None) -> None:
         self._time = time
         self._diagnostics = diagnostics
         self._table = ArrayTable()
+        self._subdivision = SubdivisionReader(self._ints, self._floats, self._table, diagnostics, time, level)
         self._index_by_prim: dict[Any, int | None] = {}
         self.arrays = self._table.arrays
         self.shapes: list[dict[str, Any]] = []
@@ -117,7 +119,10 @@ class ShapeReader:
         holes = self._ints(prim, tokens.HOLE_INDICES)
         if holes is not None and len(holes):
             mesh["hole_indices"] = add(f"{name}.hole_indices", holes)
-        normals = self._normals(prim, name)
+        subdivision = self._subdivision.read(prim, name)
+        if subdivision is not None:
+            mesh["subdivision"] = subdivision
+        normals = self._normals(prim, name, subdivision is not None)
         if normals is not None:
             mesh["normals"] = normals
         uv = self._uv(prim, name)
@@ -159,22 +164,21 @@ class ShapeReader:
                 f"the value ({authored}) was converted to {wanted}",
             )
 
-    def _normals(self, prim: Any, name: str) -> dict[str, Any] | None:
+    def _normals(self, prim: Any, name: str, is_subdivided: bool) -> dict[str, Any] | None:
         """Return the authored normals of a polygonal mesh; USD gives those of a subdivision surface no meaning."""
-        scheme = read(prim, tokens.SUBDIVISION_SCHEME, self._time)
         primvar, plain = prim.GetAttribute(tokens.PRIMVARS_NORMALS), prim.GetAttribute(tokens.NORMALS)
         attribute = primvar if primvar and primvar.HasAuthoredValue() else plain
-        has_normals = bool(attribute) and attribute.HasAuthoredValue()
-        if scheme != tokens.NO_SUBDIVISION:
-            ignored = "; its normals are ignored, as USD has it for subdivision surfaces" if has_normals else ""
+        if not attribute or not attribute.HasAuthoredValue():
+            return None
+        if is_subdivided:
             self._diagnostics.warn(
-                "subdivision-control-mesh",
-                place(prim),
-                f"a {scheme} subdivision surface is rendered as its control mesh, flat{ignored}: "
-                'author subdivisionScheme = "none" where a polygon mesh is meant',
+                "ignored-normals",
+                f"{place(prim)}.{attribute.GetName()}",
+                "a subdivision surface has the normals of its limit, and USD gives authored ones no meaning: author "
+                'subdivisionScheme = "none" where a polygon mesh is meant',
             )
             return None
-        return self._primvar(prim, attribute, f"{name}.normals", 3) if has_normals else None
+        return self._primvar(prim, attribute, f"{name}.normals", 3)
 
     def _uv(self, prim: Any, name: str) -> dict[str, Any] | None:
         """Return ``primvars:st``, else the texture coordinates that an application named differently."""

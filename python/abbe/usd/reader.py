@@ -30,6 +30,7 @@ from .places import Places
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import OpenedStage, Opening, open_stage, source_name
+from .subdivision import refinement_level
 from .values import IDENTITY, is_finite, place, read
 
 __all__ = ["default_camera", "read_stage"]
@@ -129,13 +130,20 @@ _MAX_NESTING = 64
 class _Walk:
     """One reading of one stage at one time."""
 
-    def __init__(self, opened: OpenedStage, time: Any, purposes: frozenset[str], diagnostics: Diagnostics) -> None:
+    def __init__(
+        self,
+        opened: OpenedStage,
+        time: Any,
+        purposes: frozenset[str],
+        level: int | None,
+        diagnostics: Diagnostics,
+    ) -> None:
         self.stage = opened.stage
         self.time = time
         self.purposes = purposes
         self.diagnostics = diagnostics
         self.places = Places(time)
-        self.shapes = ShapeReader(time, diagnostics)
+        self.shapes = ShapeReader(time, diagnostics, level)
         self._table = ArrayTable()
         self.instancers = InstancerReader(time, diagnostics, self._table)
         self.groups: list[_Group] = [_Group("/")]
@@ -454,19 +462,23 @@ def read_stage(
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
+    complexity: str | None,
     strict: bool,
     **opening: Unpack[Opening],
 ) -> Description:
     """Read a stage into a description; the arguments are those of :func:`abbe.usd.describe`."""
     if missing not in ("warn", "error"):
         raise UsageError(f"missing '{missing}': choose 'warn' or 'error'")
+    refinement_level(complexity)  # before the stage is opened
     diagnostics = Diagnostics()
     source = source_name(stage_or_path)
     with quiet_usd(source, diagnostics):
         # A mask keeps the camera and the settings that were asked for by path.
         also = [path for path in (camera, render_settings, product) if path and path.startswith("/")]
         opened = open_stage(stage_or_path, also=also, diagnostics=diagnostics, **opening)
-        return _read(opened, diagnostics, frame, camera, render_settings, product, purposes, missing, strict)
+        return _read(
+            opened, diagnostics, frame, camera, render_settings, product, purposes, missing, complexity, strict
+        )
 
 
 def _read(
@@ -478,13 +490,14 @@ def _read(
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
+    complexity: str | None,
     strict: bool,
 ) -> Description:
     stage, source = opened.stage, opened.source
     time, time_code = stage_time(stage, frame)
     composition_warnings(opened, missing, diagnostics)
     settings_prim = find_settings(stage, render_settings, source, diagnostics)
-    walk = _Walk(opened, time, _purposes(purposes, settings_prim), diagnostics)
+    walk = _Walk(opened, time, _purposes(purposes, settings_prim), refinement_level(complexity), diagnostics)
     walk.run()
     assets = AssetReader(stage, time)
     materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim))

@@ -61,6 +61,22 @@ FACE_VERTEX_INDICES: Final = "faceVertexIndices"
 HOLE_INDICES: Final = "holeIndices"
 SUBDIVISION_SCHEME: Final = "subdivisionScheme"
 NO_SUBDIVISION: Final = "none"
+SUBDIVISION_SCHEMES: Final = ("catmullClark", "loop", "bilinear")
+# Options of a subdivision surface with what USD allows, the fallback last.
+INTERPOLATE_BOUNDARY: Final = ("interpolateBoundary", ("none", "edgeOnly", "edgeAndCorner"))
+FACE_VARYING_INTERPOLATION: Final = (
+    "faceVaryingLinearInterpolation",
+    ("none", "cornersOnly", "cornersPlus2", "boundaries", "all", "cornersPlus1"),
+)
+TRIANGLE_RULE: Final = ("triangleSubdivisionRule", ("smooth", "catmullClark"))
+CREASE_INDICES: Final = "creaseIndices"
+CREASE_LENGTHS: Final = "creaseLengths"
+CREASE_SHARPNESSES: Final = "creaseSharpnesses"
+CORNER_INDICES: Final = "cornerIndices"
+CORNER_SHARPNESSES: Final = "cornerSharpnesses"
+SUBDIVISION_LEVEL: Final = "abbe:subdivision:level"
+# usdrecord's names for refinement levels 0 to 3.
+COMPLEXITIES: Final = ("low", "medium", "high", "veryhigh")
 NORMALS: Final = "normals"
 PRIMVARS_NORMALS: Final = "primvars:normals"
 PRIMVARS: Final = "primvars"
@@ -220,6 +236,7 @@ LENS_NAMES: Final = {
     "abbe:lens:back:aspheres": "double[]",
     "abbe:lens:back:semiDiameter": "double",
 }
+MESH_NAMES: Final = {SUBDIVISION_LEVEL: "int"}
 SCALAR_IOR: Final = "abbe:scalarIor"
 SETTINGS_NAMES: Final = {
     "abbe:integrator": "token",
@@ -244,7 +261,7 @@ VAR_NAMES: Final = {
 }
 OUR_SCHEMAS: Final = {
     "Material": MATERIAL_NAMES,
-    "Mesh": LENS_NAMES,
+    "Mesh": {**LENS_NAMES, **MESH_NAMES},
     "Xform": LENS_NAMES,
     RENDER_SETTINGS: SETTINGS_NAMES,
     RENDER_VAR: VAR_NAMES,
