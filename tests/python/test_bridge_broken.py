@@ -255,3 +255,21 @@ def test_a_camera_too_far_away_to_see_anything_sees_nothing(distance, tmp_path):
     scene = _core.Scene(description.to_json(), description.arrays)
     film = scene.render('{"aovs": ["depth", "dispersion"], "width": 8, "height": 8}')
     assert film.statistics["complete"] and film.statistics["non_finite_values"] == 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ("rel camera = </Render.camera>", r"^</Render>\.camera: leads back to itself: name a Camera"),
+        ("rel camera = </Nope>", r"^</Render>\.camera: there is no </Nope>"),
+        ("rel camera = </Good>", r"^</Render>\.camera: </Good> is a Sphere, not a Camera"),
+        ("rel products = </Render>", r"^</Render>\.products: </Render> is a RenderSettings, not a RenderProduct"),
+        ("uniform int2 resolution = (1000000000, 1000000000)", r"Render\.resolution: is \(1000000000, 1000000000\)"),
+        ("uniform float pixelAspectRatio = nan", r"^</Render>\.pixelAspectRatio = .*: is not 1 finite number"),
+    ],
+)
+def test_what_the_settings_ask_for_and_cannot_be_had_is_an_error(settings, message, tmp_path):
+    (tmp_path / "stage.usda").write_text(GOOD + f'def RenderSettings "Render"\n{{\n {settings}\n}}\n')
+    with pytest.raises(StageError, match=message):
+        description = describe(tmp_path / "stage.usda")
+        _core.Scene(description.to_json(), description.arrays).plan('{"aovs": ["depth"]}')

@@ -584,7 +584,10 @@ def default_camera(stage: Any, settings: Any, cameras: list[Any]) -> Any:
     """Return the settings' camera, else the primary one by USD's convention, else the first; None if there is none."""
     if settings is not None:
         relationship = settings.GetRelationship(tokens.CAMERA)
-        for path in relationship.GetForwardedTargets() if relationship else []:
+        targets = relationship.GetForwardedTargets() if relationship else []
+        if relationship and relationship.GetTargets() and not targets:
+            raise StageError(f"{place(relationship)}: leads back to itself: name a Camera")
+        for path in targets:
             prim = stage.GetPrimAtPath(path)
             if prim and prim.IsA(UsdGeom.Camera):
                 return prim
