@@ -128,8 +128,9 @@ impl<'a> Collector<'a> {
 fn is_sliver([a, b, c]: [DVec3; 3]) -> bool {
     let (e1, e2, e3) = (b - a, c - a, c - b);
     let longest = e1.length_squared().max(e2.length_squared()).max(e3.length_squared());
-    let twice_area = e1.cross(e2).length();
-    twice_area <= 2.0 * SLIVER * longest
+    // Squared: points are single precision, so that nothing under- or overflows.
+    let bound = 2.0 * SLIVER * longest;
+    e1.cross(e2).length_squared() <= bound * bound
 }
 
 fn widen([x, y, z]: [f32; 3]) -> DVec3 {
