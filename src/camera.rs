@@ -7,9 +7,11 @@
 //! Distances of a camera (focus, near and far) are those of its own space: a scaled camera scales them.
 
 mod clipping;
+mod exposure;
 mod lens;
 
 pub use clipping::{Clipping, Sight};
+pub use exposure::linear_exposure_scale;
 pub use lens::Lens;
 
 use glam::{DMat4, DVec3};

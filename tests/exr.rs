@@ -258,6 +258,45 @@ fn names_that_collide_are_usage_errors_naming_both() {
 }
 
 #[test]
+fn half_floats_are_the_nearest_and_never_infinite() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("out.exr");
+    for compression in ["zip", "zips", "piz", "rle", "none"] {
+        let mut film = film(window(-2, 1, 7, 38), range(0, 1, 1));
+        let normal = film.layers.iter_mut().find(|layer| layer.aov.name == "normal").unwrap();
+        normal.half = true;
+        let Values::Float(values) = &mut normal.values else { panic!("normals are floats") };
+        values[..8].copy_from_slice(&[1e9, -1e9, 65519.0, 0.1, -0.0, 6e-8, 1.0 / 3.0, 1e-9]);
+        let metadata = Metadata { compression: compression.into(), ..Metadata::default() };
+        write(&path, &film, &metadata).unwrap();
+        let (back, _) = read(&path).unwrap();
+        for (there, here) in back.layers.iter().zip(&film.layers) {
+            let (Values::Float(there_values), Values::Float(here_values)) = (&there.values, &here.values) else {
+                assert_eq!(there, here);
+                continue;
+            };
+            assert_eq!((there.half, &there.valid), (here.half, &here.valid));
+            for (&there, &value) in there_values.iter().zip(here_values) {
+                if !here.half {
+                    assert_eq!(there.to_bits(), value.to_bits());
+                } else if value.abs() > 65504.0 {
+                    assert_eq!(there, 65504f32.copysign(value), "{compression}");
+                } else {
+                    // Half of the last of 11 bits, or of the smallest step.
+                    let error = f64::from(value.abs()) * 2f64.powi(-12) * 2.0;
+                    let difference = f64::from(there - value).abs();
+                    assert!(difference <= error.max(2f64.powi(-25)), "{compression}: {there} for {value}");
+                }
+            }
+        }
+        // What was read is written again to the same bytes.
+        let first = std::fs::read(&path).unwrap();
+        write(&path, &back, &metadata).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), first, "{compression}");
+    }
+}
+
+#[test]
 fn attributes_have_the_types_of_the_standard() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("out.exr");

@@ -52,6 +52,7 @@ class Options(TypedDict, total=False):
     width: int | None
     height: int | None
     samples: int | None
+    depth_of_field: bool | None
     integrator: str | None
     aovs: Sequence[str] | None
     wavelength: float | None
@@ -59,6 +60,7 @@ class Options(TypedDict, total=False):
     dispersion_scale: float | None
     seed: int | None
     threads: int | None
+    texture_memory: int | None
     crop: tuple[int, int, int, int] | None
     sample_range: tuple[int, int] | None
     strict: bool
@@ -171,6 +173,7 @@ class Scene:
         frame: float | Literal["default"] | None = None,
         camera: str | None = None,
         render_settings: str | None = None,
+        render_pass: str | None = None,
         product: str | None = None,
         purposes: Sequence[str] | None = None,
         variants: Sequence[str] = (),
@@ -192,6 +195,7 @@ class Scene:
         frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
         camera : path of a Camera, or the name of the first such; it then replaces the cameras that products name
         render_settings : path of a RenderSettings prim; the stage's own if None
+        render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
         product : path or name of the one RenderProduct to keep
         purposes : of default, render, proxy, guide; the settings', else default and render, if None
         variants : selections such as ``"/World/Ball{material=glass}"``
@@ -200,7 +204,7 @@ class Scene:
         session_layer : a layer stronger than all of the stage, which is not changed
         mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
         payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
-        missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+        missing : what to do where a layer, prim or texture that is referred to is missing: ``"warn"`` or ``"error"``
         complexity : ``"low"``, ``"medium"``, ``"high"``, ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
             ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
         scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
@@ -227,6 +231,7 @@ class Scene:
             frame=frame,
             camera=camera,
             render_settings=render_settings,
+            render_pass=render_pass,
             product=product,
             purposes=purposes,
             variants=variants,
@@ -265,19 +270,20 @@ class Scene:
         """
         return cls(_core.Scene.load(Path(path), mapped=mapped))
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str], *, embed: bool = False) -> None:
         """Write the scene to a file for :meth:`load` and the program ``abbe-render``.
 
         Parameters
         ----------
         path : where to; complete or not at all
+        embed : put what is in the image files into it; else it names them by their absolute paths
 
         Raises
         ------
         AbbeError
             It cannot be written.
         """
-        self._core.save(Path(path))
+        self._core.save(Path(path), embed=embed)
 
     def __repr__(self) -> str:
         document = self.document
@@ -433,10 +439,12 @@ def render(
     frame: float | Literal["default"] | None = None,
     camera: str | None = None,
     render_settings: str | None = None,
+    render_pass: str | None = None,
     product: str | None = None,
     width: int | None = None,
     height: int | None = None,
     samples: int | None = None,
+    depth_of_field: bool | None = None,
     integrator: str | None = None,
     aovs: Sequence[str] | None = None,
     wavelength: float | None = None,
@@ -444,6 +452,7 @@ def render(
     dispersion_scale: float | None = None,
     seed: int | None = None,
     threads: int | None = None,
+    texture_memory: int | None = None,
     crop: tuple[int, int, int, int] | None = None,
     sample_range: tuple[int, int] | None = None,
     purposes: Sequence[str] | None = None,
@@ -470,9 +479,11 @@ def render(
     frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
     camera : path of a Camera, or the name of the first such
     render_settings : path of a RenderSettings prim
+    render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
     product : path of a RenderProduct; needed where the stage has several
     width, height : pixels, >= 1; one alone keeps the aspect
     samples : samples per pixel, >= 1
+    depth_of_field : spread samples over the camera's lens; as the stage says if None
     integrator : a name of :func:`integrators`
     aovs : names of AOVs or aliases of them (``abbe aovs`` lists them); the stage's RenderVars if None
     wavelength : reference wavelength, nm
@@ -480,6 +491,7 @@ def render(
     dispersion_scale : multiplies all dispersion: 0 none, 1 physical
     seed : same seed, same bits, on any number of threads
     threads : all of the machine's if None
+    texture_memory : for the texels of images, MB, 4294 if None; what does not fit goes to a temporary file
     crop : x0, y0, x1, y1 in pixels, half-open, y down
     sample_range : begin and end, half-open: a part that :func:`merge` joins with others
     purposes, variants, overrides, search_paths, session_layer, mask, payloads, missing, complexity, scalar_ior : as for
@@ -509,6 +521,7 @@ def render(
         frame=frame,
         camera=camera,
         render_settings=render_settings,
+        render_pass=render_pass,
         product=product,
         purposes=purposes,
         variants=variants,
@@ -528,6 +541,7 @@ def render(
         width=width,
         height=height,
         samples=samples,
+        depth_of_field=depth_of_field,
         integrator=integrator,
         aovs=aovs,
         wavelength=wavelength,
@@ -535,6 +549,7 @@ def render(
         dispersion_scale=dispersion_scale,
         seed=seed,
         threads=threads,
+        texture_memory=texture_memory,
         crop=crop,
         sample_range=sample_range,
         strict=strict,

@@ -350,6 +350,8 @@ def _picture(tile: Tile) -> _Picture:
         return _coordinates(values, some)
     if tile.aov == "internal_transmittance":
         return _filter(values, some)
+    if tile.aov.endswith("albedo"):
+        return _Picture(srgb(np.clip(values, 0.0, 1.0)), _note("linear Rec. 709, shown as sRGB"))
     if channels == 2:
         return _vectors(values, some, tile.unit)
     if channels > 1:

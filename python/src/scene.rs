@@ -69,9 +69,13 @@ impl PyScene {
         released(py, || Self::build(file::read(&path, mapped)?))
     }
 
-    /// Writes the scene as a file, complete or not at all.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> Outcome<()> {
-        released(py, || Ok(file::write(&path, self.scene.description())?))
+    /// Writes the scene as a file, complete or not at all; `embed` puts what is in its image files into it.
+    #[pyo3(signature = (path, *, embed = false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, embed: bool) -> Outcome<()> {
+        released(py, || {
+            let description = self.scene.description();
+            Ok(if embed { file::write(&path, &file::embedded(description))? } else { file::write(&path, description)? })
+        })
     }
 
     /// The scene description's document, as JSON.

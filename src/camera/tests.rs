@@ -170,3 +170,39 @@ fn a_view_of_parallel_rays_may_begin_behind_its_camera() {
     assert!((behind.depth(p - behind.position) - 3.0).abs() < 1e-14);
     assert!((plain.depth(p - plain.position) - 3.0).abs() < 1e-14);
 }
+
+#[test]
+fn the_aperture_takes_the_images_shape_by_policy() {
+    // UsdRenderComputeSpec: width, height and pixel aspect ratio that each policy leaves of 36 × 24 (3:2).
+    let (wide, high) = ([60, 20], [20, 40]);
+    use ConformPolicy::{
+        AdjustApertureHeight, AdjustApertureWidth, AdjustPixelAspectRatio, CropAperture, ExpandAperture,
+    };
+    #[rustfmt::skip]
+    let table = [
+        // Twice as wide as the aperture (3:1), and three times as high (1:2); then with pixels of 2:1 (1:1).
+        (ExpandAperture,         wide, 1.0, [72.0, 24.0], 1.0),
+        (CropAperture,           wide, 1.0, [36.0, 12.0], 1.0),
+        (AdjustApertureWidth,    wide, 1.0, [72.0, 24.0], 1.0),
+        (AdjustApertureHeight,   wide, 1.0, [36.0, 12.0], 1.0),
+        (AdjustPixelAspectRatio, wide, 1.0, [36.0, 24.0], 0.5),
+        (ExpandAperture,         high, 1.0, [36.0, 72.0], 1.0),
+        (CropAperture,           high, 1.0, [12.0, 24.0], 1.0),
+        (AdjustApertureWidth,    high, 1.0, [12.0, 24.0], 1.0),
+        (AdjustApertureHeight,   high, 1.0, [36.0, 72.0], 1.0),
+        (AdjustPixelAspectRatio, high, 1.0, [36.0, 24.0], 3.0),
+        (ExpandAperture,         high, 2.0, [36.0, 36.0], 2.0),
+        (CropAperture,           high, 2.0, [24.0, 24.0], 2.0),
+        (AdjustApertureWidth,    high, 2.0, [24.0, 24.0], 2.0),
+        (AdjustApertureHeight,   high, 2.0, [36.0, 36.0], 2.0),
+        (AdjustPixelAspectRatio, high, 2.0, [36.0, 24.0], 3.0),
+    ];
+    for (policy, resolution, ratio, [width, height], pixel) in table {
+        let camera = Camera::new(&authored(), resolution, ratio, policy).unwrap();
+        let case = format!("{policy:?} {resolution:?} {ratio}");
+        assert!((camera.window[0] * 35.0 - width).abs() < 1e-12, "{case}: {:?}", camera.window);
+        assert!((camera.window[1] * 35.0 - height).abs() < 1e-12, "{case}: {:?}", camera.window);
+        assert!((camera.pixel_aspect_ratio - pixel).abs() < 1e-12, "{case}: {}", camera.pixel_aspect_ratio);
+        assert!(ConformPolicy::TOKENS.iter().any(|token| ConformPolicy::from_token(token) == Some(policy)));
+    }
+}

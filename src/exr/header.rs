@@ -9,7 +9,7 @@ use std::path::Path;
 use ::exr::compression::Compression;
 use serde::{Deserialize, Serialize};
 
-use super::layout::{self, Channel, LayerKind};
+use super::layout::{self, Channel, LayerKind, Stored};
 use super::{Head, LAYERS, SAMPLE_RANGE, UNIT};
 use crate::error::{Error, Result};
 use crate::film::aov::{self, SampleType};
@@ -143,6 +143,8 @@ struct LayerEntry {
     aov: String,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     sums: bool,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    half: bool,
 }
 
 /// The header for `head` with the caller's `metadata`.
@@ -221,8 +223,9 @@ fn own_attributes(head: &Head, channels: &[Channel], compression: u8) -> Result<
     for channel in channels {
         put_text(&mut list, &channel.name);
         let sample: u32 = match channel.sample {
-            SampleType::Uint => 0,
-            SampleType::Float => 2,
+            Stored::Uint => 0,
+            Stored::Half => 1,
+            Stored::Float => 2,
         };
         // Type; pLinear and three reserved bytes; horizontal and vertical sampling.
         for word in [sample, 0, 1, 1] {
@@ -233,7 +236,12 @@ fn own_attributes(head: &Head, channels: &[Channel], compression: u8) -> Result<
     let entries: Vec<LayerEntry> = head
         .layers
         .iter()
-        .map(|kind| LayerEntry { name: kind.name.clone(), aov: kind.aov.name.to_owned(), sums: kind.sums })
+        .map(|kind| LayerEntry {
+            name: kind.name.clone(),
+            aov: kind.aov.name.to_owned(),
+            sums: kind.sums,
+            half: kind.half,
+        })
         .collect();
     let layers = serde_json::to_string(&entries).expect("strings and flags always serialise");
     let SampleRange { begin, end, total } = head.samples;
@@ -289,28 +297,38 @@ fn box_bytes(window: Window) -> Vec<u8> {
     [window.x0, window.y0, window.x1 - 1, window.y1 - 1].iter().flat_map(|c| c.to_le_bytes()).collect()
 }
 
-/// The caller's attribute as it goes into the file; `None` for what the head says too.
-fn caller_attribute(head: &Head, name: &str, value: &Attribute) -> Result<Option<Raw>> {
+/// The type that OpenEXR defines for the attribute `name`, if it does.
+pub fn standard_type(name: &str) -> Option<&'static str> {
+    STANDARD.iter().find(|(_, names)| names.contains(&name)).map(|(kind, _)| *kind)
+}
+
+/// Whether a file can have the attribute `name` with this value.
+pub fn check_attribute(name: &str, value: &Attribute) -> Result<()> {
     let place = || format!("attribute {name}");
-    if name == "pixelAspectRatio" && *value == Attribute::Float(head.pixel_aspect_ratio) {
-        return Ok(None);
-    }
     if OWN.contains(&name) || name == SAMPLE_RANGE {
         return Err(Error::usage(place(), "comes from the film: leave it out of the metadata"));
     }
     if name.is_empty() || name.len() > 255 || name.contains('\0') {
         return Err(Error::usage(place(), "no attribute of EXR: a name has 1 to 255 bytes and no NUL"));
     }
-    let standard = STANDARD.iter().find(|(_, names)| names.contains(&name)).map(|(kind, _)| *kind);
-    let (kind, bytes) = encode_value(value, standard == Some("stringvector"));
-    if let Some(expected) = standard
-        && expected != kind
-    {
-        return Err(Error::usage(
+    let standard = standard_type(name);
+    let (kind, _) = encode_value(value, standard == Some("stringvector"));
+    match standard {
+        Some(expected) if expected != kind => Err(Error::usage(
             place(),
             format!("OpenEXR defines its type as {expected}, and other programs refuse a {kind}: set that type"),
-        ));
+        )),
+        _ => Ok(()),
     }
+}
+
+/// The caller's attribute as it goes into the file; `None` for what the head says too.
+fn caller_attribute(head: &Head, name: &str, value: &Attribute) -> Result<Option<Raw>> {
+    if name == "pixelAspectRatio" && *value == Attribute::Float(head.pixel_aspect_ratio) {
+        return Ok(None);
+    }
+    check_attribute(name, value)?;
+    let (kind, bytes) = encode_value(value, standard_type(name) == Some("stringvector"));
     Ok(Some(Raw { name: name.to_owned(), kind, bytes }))
 }
 
@@ -467,7 +485,7 @@ fn understand(path: &Path, mut attributes: Vec<(String, String, Vec<u8>)>) -> Re
     let entries: Vec<LayerEntry> =
         serde_json::from_slice(&layers).map_err(|e| damaged(path, format!("attribute `{LAYERS}`: {e}")))?;
     let mut layers = Vec::with_capacity(entries.len());
-    for LayerEntry { name, aov, sums } in entries {
+    for LayerEntry { name, aov, sums, half } in entries {
         let row = aov::AOVS.iter().find(|row| row.name == aov).ok_or_else(|| {
             Error::file(
                 path,
@@ -477,7 +495,10 @@ fn understand(path: &Path, mut attributes: Vec<(String, String, Vec<u8>)>) -> Re
         if sums && !row.has_validity {
             return Err(damaged(path, format!("layer `{name}` cannot have sums")));
         }
-        layers.push(LayerKind { aov: row, name, sums });
+        if half && row.sample == SampleType::Uint {
+            return Err(damaged(path, format!("layer `{name}` cannot be in half floats")));
+        }
+        layers.push(LayerKind { aov: row, name, sums, half });
     }
     let samples = String::from_utf8(need(SAMPLE_RANGE, "string")?)
         .ok()

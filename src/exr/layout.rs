@@ -10,6 +10,8 @@
 //!
 //! A layer with an empty name has bare channels; in `abbe_partial` it goes by its AOV's name.
 
+use half::f16;
+
 use crate::error::{Error, Result};
 use crate::film::aov::{Aov, SampleType};
 use crate::film::{Film, Layer, Values};
@@ -26,12 +28,19 @@ pub struct LayerKind {
     pub name: String,
     /// Whether exact sums are kept.
     pub sums: bool,
+    /// Whether values are stored in 16 bits.
+    pub half: bool,
 }
 
 impl LayerKind {
     /// The kind of `layer`.
     pub fn of(layer: &Layer) -> Self {
-        Self { aov: layer.aov, name: layer.name.clone(), sums: layer.sums.is_some() }
+        Self { aov: layer.aov, name: layer.name.clone(), sums: layer.sums.is_some(), half: layer.half }
+    }
+
+    /// A layer of this kind without values.
+    pub fn layer(&self, pixels: usize) -> Layer {
+        Layer { half: self.half, ..Layer::new(self.aov, self.name.clone(), pixels, self.sums) }
     }
 
     /// What errors and attributes call the layer: its name, or its AOV's where that is empty.
@@ -84,11 +93,29 @@ impl Source {
     }
 }
 
+/// How a number is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stored {
+    Uint,
+    Half,
+    Float,
+}
+
+impl Stored {
+    /// Bytes.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::Half => 2,
+            Self::Uint | Self::Float => 4,
+        }
+    }
+}
+
 /// One channel of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Channel {
     pub(super) name: String,
-    pub(super) sample: SampleType,
+    pub(super) sample: Stored,
     pub(super) source: Source,
 }
 
@@ -128,17 +155,21 @@ pub(super) fn channels(layers: &[LayerKind]) -> Result<Vec<Channel>> {
         for (component, suffix) in layer.aov.channels.iter().enumerate() {
             channels.push(Channel {
                 name: layer.channel(suffix),
-                sample: layer.aov.sample,
+                sample: match layer.aov.sample {
+                    SampleType::Uint => Stored::Uint,
+                    SampleType::Float if layer.half => Stored::Half,
+                    SampleType::Float => Stored::Float,
+                },
                 source: Source::Value { layer: index, component },
             });
         }
         if layer.aov.has_validity {
             let source = Source::Valid { layer: index };
-            channels.push(Channel { name: layer.channel("valid"), sample: SampleType::Float, source });
+            channels.push(Channel { name: layer.channel("valid"), sample: Stored::Float, source });
         }
         if layer.sums {
             let title = layer.title();
-            let mut add = |name: String, source| channels.push(Channel { name, sample: SampleType::Uint, source });
+            let mut add = |name: String, source| channels.push(Channel { name, sample: Stored::Uint, source });
             for (component, suffix) in layer.aov.channels.iter().enumerate() {
                 add(format!("{PARTIAL}.{title}.{suffix}_hi"), Source::SumHigh { layer: index, component });
                 add(format!("{PARTIAL}.{title}.{suffix}_lo"), Source::SumLow { layer: index, component });
@@ -149,7 +180,7 @@ pub(super) fn channels(layers: &[LayerKind]) -> Result<Vec<Channel>> {
     if let Some(layer) = layers.iter().position(|layer| layer.aov.name == "depth")
         && channels.iter().all(|channel| channel.name != "Z")
     {
-        channels.push(Channel { name: "Z".to_owned(), sample: SampleType::Float, source: Source::Twin { layer } });
+        channels.push(Channel { name: "Z".to_owned(), sample: Stored::Float, source: Source::Twin { layer } });
     }
     channels.sort_by(|a, b| a.name.as_bytes().cmp(b.name.as_bytes()));
     for pair in channels.windows(2) {
@@ -176,18 +207,23 @@ pub(super) fn channels(layers: &[LayerKind]) -> Result<Vec<Channel>> {
     Ok(channels)
 }
 
-/// Appends row `row` of `film` in `channel` to `out`, as native 32-bit words.
+/// Appends row `row` of `film` in `channel` to `out`, as native words of the channel's size.
 pub(super) fn append_row(film: &Film, channel: &Channel, row: usize, out: &mut Vec<u8>) {
     let width = film.window.width();
     let layer = &film.layers[channel.source.layer()];
     let stride = layer.aov.channels.len();
     let pixels = row * width..(row + 1) * width;
     let interleaved = |component: usize| pixels.clone().map(move |pixel| pixel * stride + component);
-    // Every source is a column of 32-bit words.
+    // Every other source is a column of 32-bit words.
     fn push(out: &mut Vec<u8>, words: impl Iterator<Item = u32>) {
         words.for_each(|word| out.extend_from_slice(&word.to_ne_bytes()));
     }
     match (channel.source, layer) {
+        (Source::Value { component, .. }, Layer { values: Values::Float(values), .. })
+            if channel.sample == Stored::Half =>
+        {
+            interleaved(component).for_each(|i| out.extend_from_slice(&to_half(values[i]).to_ne_bytes()));
+        }
         (Source::Value { component, .. }, Layer { values: Values::Float(values), .. }) => {
             push(out, interleaved(component).map(|i| values[i].to_bits()));
         }
@@ -211,7 +247,13 @@ pub(super) fn append_row(film: &Film, channel: &Channel, row: usize, out: &mut V
     }
 }
 
-/// Puts the native 32-bit words of `bytes`, a row of `channel`, into row `row` of `film`.
+/// The nearest half float; what is beyond its range is its largest.
+fn to_half(value: f32) -> f16 {
+    let half = f16::from_f32(value);
+    if half.is_infinite() { f16::MAX.copysign(half) } else { half }
+}
+
+/// Puts the native words of `bytes`, a row of `channel`, into row `row` of `film`.
 pub(super) fn store_row(film: &mut Film, channel: &Channel, row: usize, bytes: &[u8]) {
     let width = film.window.width();
     let layer = &mut film.layers[channel.source.layer()];
@@ -220,6 +262,13 @@ pub(super) fn store_row(film: &mut Film, channel: &Channel, row: usize, bytes: &
     let words = bytes.as_chunks::<4>().0.iter().map(|word| u32::from_ne_bytes(*word)).enumerate();
     match (channel.source, layer) {
         (Source::Twin { .. }, _) => {}
+        (Source::Value { component, .. }, Layer { values: Values::Float(values), .. })
+            if channel.sample == Stored::Half =>
+        {
+            for (i, word) in bytes.as_chunks::<2>().0.iter().enumerate() {
+                values[(first + i) * stride + component] = f16::from_ne_bytes(*word).to_f32();
+            }
+        }
         (Source::Value { component, .. }, Layer { values: Values::Float(values), .. }) => {
             words.for_each(|(i, word)| values[(first + i) * stride + component] = f32::from_bits(word));
         }

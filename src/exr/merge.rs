@@ -282,7 +282,7 @@ fn join(parts: &mut [Part], strips: &[Strip], head: &Head, band: Window) -> Resu
         let (y0, y1) = (part.window.y0.max(band.y0), part.window.y1.min(band.y1));
         films.push(if y0 < y1 { Some(part.reader.rows(y0, y1)?) } else { None });
     }
-    let new = |kind: &super::layout::LayerKind| Layer::new(kind.aov, kind.name.clone(), band.area(), kind.sums);
+    let new = |kind: &super::layout::LayerKind| kind.layer(band.area());
     let mut joined = Film {
         resolution: head.resolution,
         window: band,

@@ -1,7 +1,7 @@
 //! Multichannel EXR: layers, types, header, atomic writing, exact reading and merging.
 //!
-//! One film is one file: single-part scan lines, channels `layer.X`, one compression. Everything but ids and counts is
-//! FLOAT; these are UINT. `<layer>.valid` stands beside a layer that can lack values; `depth` is there a second time as
+//! One film is one file: single-part scan lines, channels `layer.X`, one compression. Ids and counts are UINT, the
+//! rest is FLOAT, or HALF where a layer says so. `<layer>.valid` stands beside a layer that can lack values; `depth` is there a second time as
 //! the bare `Z` that compositors look for. A render of a part of its samples also carries the exact sums behind its
 //! means ([`layout`]), which lets [`merge()`] join parts to the bits of one render.
 //!
@@ -20,6 +20,7 @@ mod writer;
 use std::borrow::Cow;
 use std::path::Path;
 
+pub use header::{check_attribute, standard_type};
 pub use merge::{PER_PART, merge};
 pub use reader::Reader;
 

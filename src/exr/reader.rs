@@ -12,7 +12,7 @@ use super::layout::{self, Channel};
 use super::{Head, writer};
 use crate::error::{Error, Result};
 use crate::film::metadata::Metadata;
-use crate::film::{Film, Layer, Window};
+use crate::film::{Film, Window};
 
 /// No compression of ours packs tighter: 1032 is the limit of deflate (258 bytes from two bits); RLE reaches 64 and the
 /// run code of PIZ 408.
@@ -48,7 +48,7 @@ impl Reader {
         let Window { y0, y1, .. } = head.window;
         let lines = compression.scan_lines_per_block();
         let count = head.window.height().div_ceil(lines) as u64;
-        let row = head.window.width() as u64 * channels.len() as u64 * 4;
+        let row = head.window.width() as u64 * writer::bytes_per_pixel(&channels) as u64;
         let table_end = length + count * 8;
         if table_end > known.len() {
             return Err(damaged(path, "the file is shorter than its header says"));
@@ -116,7 +116,7 @@ impl Reader {
             window,
             pixel_aspect_ratio: self.head.pixel_aspect_ratio,
             samples: self.head.samples,
-            layers: layers.map(|kind| Layer::new(kind.aov, kind.name.clone(), window.area(), kind.sums)).collect(),
+            layers: layers.map(|kind| kind.layer(window.area())).collect(),
         };
         let lines = self.codec.compression.scan_lines_per_block() as i32;
         let wanted: Vec<usize> = ((y0 - top) / lines..=(y1 - 1 - top) / lines).map(|k| k as usize).collect();
@@ -137,10 +137,14 @@ impl Reader {
                         .map_err(|e| damaged(&self.path, format!("block {k}: {e}")))
                 })
                 .collect::<Result<_>>()?;
-            let row_bytes = window.width() * 4;
             for (y, end, data) in unpacked {
+                let mut rest = data.as_slice();
                 let rows = (y..end).flat_map(|y| self.channels.iter().map(move |channel| (y, channel)));
-                for ((y, channel), bytes) in rows.zip(data.chunks_exact(row_bytes)) {
+                for (y, channel) in rows {
+                    let (bytes, after) = rest
+                        .split_at_checked(window.width() * channel.sample.size())
+                        .ok_or_else(|| damaged(&self.path, "a block is too short"))?;
+                    rest = after;
                     if (y0..y1).contains(&y) {
                         layout::store_row(&mut film, channel, (y - y0) as usize, bytes);
                     }

@@ -11,20 +11,16 @@ use ::exr::prelude::{SmallVec, Vec2};
 use rayon::prelude::*;
 
 use super::header::Encoded;
-use super::layout::Channel;
+use super::layout::{Channel, Stored};
 use super::{Head, header, layout};
 use crate::atomic;
 use crate::error::{Error, Result};
-use crate::film::aov::SampleType;
 use crate::film::metadata::Metadata;
 use crate::film::{Film, Window};
 
 /// Rows that are compressed at once: several blocks of every compression (1, 16 or 32 lines), so that threads have work
 /// and a merge needs little memory.
 pub(super) const BAND: i32 = 128;
-
-/// Bytes of a 32-bit sample.
-const SAMPLE: usize = 4;
 
 /// Writes the film that `head` tells of; `band` gives the pixels of each window that it is asked for, or of a larger one.
 pub(super) fn write_bands<'a>(
@@ -37,7 +33,8 @@ pub(super) fn write_bands<'a>(
     let codec = codec_header(head.window, compression, &channels);
     let lines = compression.scan_lines_per_block() as i32;
     let Window { x0, y0, x1, y1 } = head.window;
-    if i32::try_from(head.window.width() * channels.len() * SAMPLE * lines as usize).is_err() {
+    let bytes_per_pixel = bytes_per_pixel(&channels);
+    if i32::try_from(head.window.width() * bytes_per_pixel * lines as usize).is_err() {
         return Err(Error::usage(
             "EXR",
             format!(
@@ -75,9 +72,14 @@ pub(super) fn write_bands<'a>(
     })
 }
 
+/// Bytes of all channels of a pixel.
+pub(super) fn bytes_per_pixel(channels: &[Channel]) -> usize {
+    channels.iter().map(|channel| channel.sample.size()).sum()
+}
+
 /// The rows `y0..y1`, channel after channel in each row, compressed.
 fn block(film: &Film, channels: &[Channel], codec: &Header, y0: i32, y1: i32) -> ::exr::error::Result<Vec<u8>> {
-    let mut data = Vec::with_capacity((y1 - y0) as usize * film.window.width() * channels.len() * SAMPLE);
+    let mut data = Vec::with_capacity((y1 - y0) as usize * film.window.width() * bytes_per_pixel(channels));
     for y in y0..y1 {
         let row = (y - film.window.y0) as usize;
         channels.iter().for_each(|channel| layout::append_row(film, channel, row, &mut data));
@@ -102,8 +104,9 @@ pub(super) fn codec_header(
         .map(|channel| ChannelDescription {
             name: Text::from_slice_unchecked(channel.name.as_bytes()),
             sample_type: match channel.sample {
-                SampleType::Float => ExrSample::F32,
-                SampleType::Uint => ExrSample::U32,
+                Stored::Half => ExrSample::F16,
+                Stored::Float => ExrSample::F32,
+                Stored::Uint => ExrSample::U32,
             },
             quantize_linearly: false,
             sampling: Vec2(1, 1),

@@ -66,9 +66,32 @@ pub struct Aov {
     pub doc: &'static str,
 }
 
+/// What 11 bits of mantissa and a range of 65504 are enough for: colours and unit vectors.
+const SOUND_IN_HALF: &[&str] = &[
+    "color",
+    "albedo",
+    "refracted_albedo",
+    "emission",
+    "refracted_emission",
+    "normal",
+    "normal_geometric",
+    "refracted_normal",
+    "refracted_normal_geometric",
+    INTERNAL_TRANSMITTANCE,
+];
+
+impl Aov {
+    /// Whether half floats hold what its values are for.
+    pub fn is_sound_in_half(&self) -> bool {
+        SOUND_IN_HALF.contains(&self.name)
+    }
+}
+
 const XYZ: &[&str] = &["X", "Y", "Z"];
 const XY: &[&str] = &["X", "Y"];
 const UV: &[&str] = &["U", "V"];
+/// A colour: the one thing that is R, G, B.
+const RGB: &[&str] = &["R", "G", "B"];
 const X: &[&str] = &["X"];
 const Z: &[&str] = &["Z"];
 const I: &[&str] = &["I"];
@@ -89,6 +112,11 @@ const fn first(name: &'static str, unit: &'static str, family: Family, doc: &'st
 
 /// The one AOV that the absorption of media is summed for.
 pub const INTERNAL_TRANSMITTANCE: &str = "internal_transmittance";
+
+/// Whether an AOV is that of a surface's color.
+pub fn is_albedo(aov: &Aov) -> bool {
+    matches!(aov.name, "albedo" | "refracted_albedo")
+}
 
 /// Every AOV of the geometric and differential passes.
 pub static AOVS: &[Aov] = &[
@@ -197,6 +225,13 @@ pub static AOVS: &[Aov] = &[
     ),
     mean("uv", UV, "1", Family::FirstSurface, "texture coordinates of the first surface"),
     mean(
+        "albedo",
+        RGB,
+        "1",
+        Family::FirstSurface,
+        "what denoisers expect of the first surface, linear Rec. 709: base color of what is diffuse, reflectance at normal incidence of a metal, tint of what transmits (1 for clear glass), displayColor where there is no material",
+    ),
+    mean(
         "refracted_depth",
         Z,
         "stage unit",
@@ -225,6 +260,7 @@ pub static AOVS: &[Aov] = &[
         "unit geometric normal at the chain's end, world space, outward as authored",
     ),
     mean("refracted_uv", UV, "1", Family::Chain, "texture coordinates at the chain's end"),
+    mean("refracted_albedo", RGB, "1", Family::Chain, "albedo at the chain's end: of what is seen through the glass"),
     first(
         "prim_id",
         "index",
@@ -262,6 +298,7 @@ pub static ALIASES: &[(&str, &str)] = &[
     ("Nn", "normal"),
     ("Ng", "normal_geometric"),
     ("st", "uv"),
+    ("Albedo", "albedo"),
     ("Ci", "color"),
     ("C", "color"),
     ("RGBA", "color"),

@@ -95,6 +95,8 @@ pub struct Layer {
     pub aov: &'static Aov,
     /// Its EXR layer name: the AOV's, unless the stage's RenderVar says otherwise. Empty: bare channels.
     pub name: String,
+    /// Whether files store the values in 16 bits: a request of the stage, kept only where no digits are lost that matter.
+    pub half: bool,
     /// The pixels.
     pub values: Values,
     /// Fraction of samples with a value, per pixel; only where the AOV [has validity](Aov::has_validity).
@@ -113,7 +115,7 @@ impl Layer {
         };
         let valid = aov.has_validity.then(|| vec![0.0; pixels]);
         let sums = (keep_sums && aov.has_validity).then(|| Sums { values: vec![0.0; n], counts: vec![0; pixels] });
-        Self { aov, name, values, valid, sums }
+        Self { aov, name, half: false, values, valid, sums }
     }
 }
 

@@ -18,7 +18,7 @@ use crate::optics::media::{Inside, MediaStack, MediumId};
 use crate::ray::{ColumnSet, LocalSurface, RayStart, ScatterKind, Scattering, Step, Transfer};
 use crate::ray::{critical_distance, mirror, refract_or_reflect};
 use crate::scene::material::Kind;
-use crate::scene::view::{Media, View};
+use crate::scene::view::{Media, Presence, View};
 
 /// A chain that would have more events than this has no end.
 pub const MAX_EVENTS: u32 = 64;
@@ -40,6 +40,8 @@ pub struct SurfacePoint {
     pub surface: LocalSurface,
     /// 1-based, 0 for none.
     pub material_id: u32,
+    /// What it is there.
+    pub presence: Presence,
 }
 
 /// How a chain ends.
@@ -100,6 +102,8 @@ pub struct Counters {
     pub retraces: u64,
     /// Texture coordinates looked up.
     pub uv_lookups: u64,
+    /// Albedos looked up.
+    pub albedo_lookups: u64,
     /// Surfaces left that the ray was never inside of: open or inconsistently oriented glass.
     pub unmatched_exits: u64,
     /// Chains that ended after too many events.
@@ -122,6 +126,7 @@ impl Counters {
             second_chains: f(self.second_chains, other.second_chains),
             retraces: f(self.retraces, other.retraces),
             uv_lookups: f(self.uv_lookups, other.uv_lookups),
+            albedo_lookups: f(self.albedo_lookups, other.albedo_lookups),
             unmatched_exits: f(self.unmatched_exits, other.unmatched_exits),
             exhausted: f(self.exhausted, other.exhausted),
             geometric_normal_events: f(self.geometric_normal_events, other.geometric_normal_events),
@@ -242,7 +247,7 @@ impl<'a> Follower<'a> {
         let mut walk = Walk::new(self, start);
         loop {
             let met = walk.advance(counters)?;
-            if !walk.is_cut_out(&met) {
+            if met.presence != Presence::Absent {
                 return Some(met);
             }
             walk.cross(&met);
@@ -289,7 +294,7 @@ impl<'a> Follower<'a> {
                 (chain.start_medium, chain.columns) = (medium, C::start(start, &medium));
             }
             let Some(met) = met else { break };
-            let cut_out = walk.is_cut_out(&met);
+            let cut_out = met.presence == Presence::Absent;
             if !cut_out && chain.first.is_none() {
                 chain.first = Some(met);
             }
@@ -431,14 +436,16 @@ impl<'a> Walk<'a> {
             let hit = self.view.intersect(&self.ray, &self.departures)?;
             let (point, surface) = self.view.aggregate.local_surface(&self.ray, &hit);
             self.travelled += hit.distance;
-            let met = SurfacePoint { hit, point, surface, material_id: self.view.material_id(&hit) };
-            let Some(sight) = self.sight else { return Some(met) };
+            let material_id = self.view.material_id(&hit);
+            let met = SurfacePoint { hit, point, surface, material_id, presence: Presence::AsStated };
+            let seen = |met: SurfacePoint| SurfacePoint { presence: self.view.presence(&met.hit, material_id), ..met };
+            let Some(sight) = self.sight else { return Some(seen(met)) };
             if self.travelled > sight.far {
                 counters.unseen += 1;
                 return None;
             }
             if self.travelled >= sight.near && !self.view.is_hidden_from_camera(&hit) {
-                return Some(met);
+                return Some(seen(met));
             }
             self.overlook(&met, counters);
             if self.crossings > MAX_CROSSINGS {
@@ -460,10 +467,6 @@ impl<'a> Walk<'a> {
         (self.begin, self.begins_anew) = (self.travelled, true);
     }
 
-    fn is_cut_out(&self, met: &SurfacePoint) -> bool {
-        met.material_id > 0 && matches!(self.view.scene.materials[met.material_id as usize - 1].kind, Kind::PassThrough)
-    }
-
     /// What is seen from inside of a glass where `met` is its surface: an opaque surface or a mirror that coincides with it,
     /// or itself. Without this, rounding would decide for each ray whether glass that stands on a table touches it.
     fn in_contact(&self, met: SurfacePoint, counters: &mut Counters) -> SurfacePoint {
@@ -478,11 +481,12 @@ impl<'a> Walk<'a> {
             counters.rays += 1;
             let Some(hit) = self.view.coincident_backing(&ahead, &departures) else { break };
             let material_id = self.view.material_id(&hit);
-            if self.view.is_backing(material_id) {
+            let presence = self.view.presence(&hit, material_id);
+            if self.view.is_backing(material_id) && presence != Presence::Absent {
                 let (point, surface) = self.view.aggregate.local_surface(&ahead, &hit);
                 // Met where the glass was, by the ray that met the glass.
                 let hit = Hit { distance: met.hit.distance, at_start: met.hit.at_start, ..hit };
-                return SurfacePoint { hit, point, surface, material_id };
+                return SurfacePoint { hit, point, surface, material_id, presence };
             }
             departures.depart(&ahead, &hit, hit.leaving);
         }
@@ -518,6 +522,7 @@ impl<'a> Walk<'a> {
             return Event::End;
         };
         match &material.kind {
+            _ if met.presence == Presence::Opaque => Event::End,
             Kind::Opaque => Event::End,
             Kind::PassThrough => {
                 self.cross(met);

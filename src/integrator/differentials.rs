@@ -69,6 +69,7 @@ enum SurfaceValue {
     Normal,
     NormalGeometric,
     Uv,
+    Albedo,
     PrimId,
     InstanceId,
     MaterialId,
@@ -108,6 +109,7 @@ impl Output {
             "normal" => SurfaceValue::Normal,
             "normal_geometric" => SurfaceValue::NormalGeometric,
             "uv" => SurfaceValue::Uv,
+            "albedo" => SurfaceValue::Albedo,
             "prim_id" => SurfaceValue::PrimId,
             "instance_id" => SurfaceValue::InstanceId,
             "material_id" => SurfaceValue::MaterialId,
@@ -305,6 +307,10 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
                 self.counters.uv_lookups += u64::from(met.is_some());
                 let uv = met.and_then(|met| view.aggregate.uv(&met.hit, met.point));
                 out.add(layer, uv);
+            }
+            SurfaceValue::Albedo => {
+                self.counters.albedo_lookups += u64::from(met.is_some());
+                out.add(layer, met.map(|met| view.albedo(&met.hit, met.material_id)));
             }
             SurfaceValue::PrimId => out.add_first(layer, object.map_or(0, |o| o.prim_id)),
             SurfaceValue::InstanceId => out.add_first(layer, object.map_or(0, |o| o.instance_id)),

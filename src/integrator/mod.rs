@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::film::SampleRange;
-use crate::film::aov::{Aov, Family, INTERNAL_TRANSMITTANCE};
+use crate::film::aov::{Aov, Family, INTERNAL_TRANSMITTANCE, is_albedo};
 use crate::film::pixel::PixelAccumulator;
 use crate::sampler::Sampler;
 use crate::scene::view::View;
@@ -49,6 +49,8 @@ pub struct Needs {
     pub retrace: bool,
     /// Whether the absorption of the media along a chain is summed.
     pub transmittance: bool,
+    /// Whether the colours of surfaces are looked up.
+    pub albedo: bool,
 }
 
 impl Needs {
@@ -71,6 +73,7 @@ impl Needs {
             columns,
             second_chain: is_dispersive && has(Family::ScreenSecondOrder),
             retrace: is_dispersive && has(Family::Retrace),
+            albedo: aovs.iter().any(|aov| is_albedo(aov)),
             transmittance: aovs.iter().any(|aov| aov.name == INTERNAL_TRANSMITTANCE),
         }
     }

@@ -3,10 +3,11 @@
 use serde_json::json;
 
 use super::Plan;
-use crate::camera::Camera;
+use crate::camera::{Camera, linear_exposure_scale};
 use crate::film::aov::Merge;
 use crate::film::metadata::{Attribute, Metadata};
 use crate::scene::Scene;
+use crate::scene::description;
 use crate::spectrum::Wavelength;
 use glam::{DMat4, DVec4};
 
@@ -16,6 +17,8 @@ const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127
 /// What a film of `plan` says about itself. Times and machines are left out, so that the same render gives the same bytes.
 pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bool) -> Metadata {
     let mut metadata = Metadata { compression: plan.compression.clone(), ..Metadata::default() };
+    // What the product wants comes first: it does not replace what is true.
+    metadata.attributes.clone_from(&plan.header);
     let mut set = |name: &str, value| metadata.set(name, value);
     let text = |value: &str| Attribute::Text(value.to_owned());
     let stage = &scene.document().stage;
@@ -84,10 +87,44 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
         let (n, d) = if rate.fract() == 0.0 { (rate as i32, 1) } else { ((rate * 1001.0).round() as i32, 1001) };
         set("framesPerSecond", Attribute::Rational(n, d));
     }
+    let authored = &scene.document().cameras[plan.camera];
+    for (name, value) in lens(authored, stage) {
+        set(name, Attribute::Float(value));
+    }
+    if let Some(exposure) = &authored.exposure {
+        let scale = linear_exposure_scale(exposure);
+        if scale.is_finite() {
+            set("abbe:exposureScale", Attribute::Double(scale));
+        }
+    }
     let (to_camera, to_ndc) = matrices(camera);
     set("worldToCamera", Attribute::Matrix(to_camera));
     set("worldToNDC", Attribute::Matrix(to_ndc));
     metadata
+}
+
+/// Standard attributes of a camera, in the units that OpenEXR defines for them; those that nothing is authored for are left
+/// out.
+fn lens(camera: &description::Camera, stage: &description::Stage) -> Vec<(&'static str, f32)> {
+    let exposure = camera.exposure.unwrap_or_default();
+    let opening = camera.shutter_close - camera.shutter_open;
+    // The shutter is in time codes about the frame.
+    let seconds = stage.time_codes_per_second.map(|rate| opening / rate);
+    let angle = seconds.zip(stage.frames_per_second).map(|(seconds, rate)| 360.0 * seconds * rate);
+    let is_perspective = camera.projection == "perspective";
+    let millimetres = camera.focal_length * 0.1 * stage.meters_per_unit * 1000.0;
+    [
+        ("expTime", exposure.time.or(seconds)),
+        ("shutterAngle", angle),
+        ("isoSpeed", exposure.iso),
+        ("aperture", Some(camera.f_stop)),
+        ("focus", Some(camera.focus_distance * stage.meters_per_unit)),
+        ("nominalFocalLength", is_perspective.then_some(millimetres)),
+    ]
+    .into_iter()
+    .filter_map(|(name, value)| Some((name, value? as f32)))
+    .filter(|(_, value)| *value > 0.0 && value.is_finite())
+    .collect()
 }
 
 /// World to camera (left-handed, +z forward, as OpenEXR wants it) and world to NDC (origin top-left, y down, z unused),

@@ -3,11 +3,14 @@
 //! Tiles are rendered by any thread in any order; what a pixel gets depends on the pixel alone, so the film has the same
 //! bits for any number of threads. Cancelling leaves the finished tiles.
 
+mod driver;
+mod layers;
 pub mod metadata;
 pub mod plan;
 pub mod request;
 mod settings;
 mod shot;
+mod textures;
 pub mod trace;
 mod validity;
 
@@ -18,6 +21,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
+pub use layers::PlannedLayer;
 pub use plan::{Plan, plan};
 pub use request::Request;
 pub use trace::trace;
@@ -34,6 +38,7 @@ use crate::integrator::{Registry, Task};
 use crate::sampler::Sampler;
 use crate::scene::view::View;
 use crate::scene::{Counts, Scene};
+use crate::texture::TextureCounts;
 
 /// Side of a tile, pixels: small enough to share the work evenly, large enough to forget its administration.
 const TILE: i32 = 16;
@@ -83,6 +88,8 @@ pub struct Statistics {
     pub plan: Plan,
     /// Sizes of the scene.
     pub scene: Counts,
+    /// Images of the scene: named, read, kept.
+    pub textures: TextureCounts,
     /// What tracing cost.
     pub counters: Counters,
     /// Values that were not finite and became absent.
@@ -136,6 +143,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
     let integrator = registry.find(&plan.integrator)?;
     let camera = camera(scene, plan)?;
     let view = View::new(scene, camera.position);
+    textures::prepare(scene, &plan.needs, plan.texture_memory)?;
     let aovs: Vec<&'static Aov> = plan.layers.iter().map(|layer| layer.aov).collect();
     let task = Task {
         view: &view,
@@ -159,7 +167,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
     tiles.par_iter().for_each_init(
         || (prepared.worker(), PixelAccumulator::new(aovs.iter().copied(), plan.samples), Counters::default(), 0),
         |(worker, pixel, counted, non_finite_counted), &tile| {
-            if control.cancel.load(Ordering::Relaxed) {
+            if control.cancel.load(Ordering::Relaxed) || textures::has_failed(scene) {
                 return;
             }
             let keep_sums = !plan.samples.is_all();
@@ -194,6 +202,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
 
     let mut warnings = scene.diagnostics().clone();
     warnings.extend(&plan.diagnostics);
+    textures::report_unreadable(scene, &mut warnings)?;
     if counters.unmatched_exits > 0 {
         warnings.warn(
             "unmatched-exits",
@@ -246,6 +255,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
         pixels,
         plan: plan.clone(),
         scene: scene.counts,
+        textures: scene.textures.counts(),
         counters,
         non_finite_values,
         warnings,
@@ -278,7 +288,11 @@ fn empty_film(plan: &Plan, camera: &Camera) -> Result<Film> {
         window: plan.window,
         pixel_aspect_ratio: camera.pixel_aspect_ratio as f32,
         samples: plan.samples,
-        layers: plan.layers.iter().map(|layer| Layer::new(layer.aov, layer.name.clone(), pixels, keep_sums)).collect(),
+        layers: plan
+            .layers
+            .iter()
+            .map(|layer| Layer { half: layer.half, ..Layer::new(layer.aov, layer.name.clone(), pixels, keep_sums) })
+            .collect(),
     })
 }
 

@@ -6,14 +6,18 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::driver::Driver;
+use super::layers::{PlannedLayer, layers};
 use super::request::Request;
 use super::settings::{self, Attributes};
 use super::shot::{DepthOfField, Shot};
+use super::textures;
 use super::validity;
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::{Aov, INTERNAL_TRANSMITTANCE};
+use crate::film::metadata::Attribute;
 use crate::film::{SampleRange, Window};
 use crate::geometry::Shape;
 use crate::integrator::transmittance::absorbs;
@@ -23,20 +27,6 @@ use crate::scene::Scene;
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
 use crate::spectrum::{Wavelength, lines};
-
-/// One layer to be rendered.
-#[derive(Clone, Debug, Serialize)]
-pub struct PlannedLayer {
-    /// Its AOV.
-    #[serde(serialize_with = "aov_name")]
-    pub aov: &'static Aov,
-    /// EXR layer name.
-    pub name: String,
-}
-
-fn aov_name<S: serde::Serializer>(aov: &&'static Aov, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(aov.name)
-}
 
 /// A decision with its reason.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -106,6 +96,8 @@ pub struct Plan {
     pub seed: u64,
     /// Threads, 0 for all.
     pub threads: usize,
+    /// Memory for the texels of images, bytes.
+    pub texture_memory: u64,
     /// Name of the integrator.
     pub integrator: String,
     /// Layers in the film's order.
@@ -116,6 +108,9 @@ pub struct Plan {
     pub needs: Needs,
     /// EXR compression.
     pub compression: String,
+    /// Attributes that the product wants in the header.
+    #[serde(skip)]
+    pub header: Vec<(String, Attribute)>,
     /// What is carried and computed, and why.
     pub carried: Vec<Decision>,
     /// What is skipped, and why.
@@ -154,7 +149,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let samples = settings::samples(request, &attributes)?;
     let shot = Shot::new(scene, request, product, samples, &mut diagnostics)?;
     let optics = settings::optics(request, &attributes)?;
-    let (integrator, layers) = settings::layers(request, &attributes, product, registry, &mut diagnostics)?;
+    let (integrator, layers) = layers(request, &attributes, product, registry, &mut diagnostics)?;
     let integrator = registry.find(&integrator)?;
     let aovs: Vec<&Aov> = layers.iter().map(|layer| layer.aov).collect();
     let dispersive = dispersive_material(scene, &optics);
@@ -171,8 +166,9 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         (None, Some(seed)) => seed as u64,
         (None, None) => 0,
     };
-    let compression = product.map(|p| settings::compression(p, &mut diagnostics)).unwrap_or_default();
+    let driver = product.map(|p| Driver::new(p, &mut diagnostics)).unwrap_or_default();
     attributes.warn_of_unused(&mut diagnostics);
+    textures::report_missing(scene, &needs, &mut diagnostics);
     if request.strict {
         refuse_warnings(&[scene.diagnostics(), &diagnostics])?;
     }
@@ -190,11 +186,13 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         samples,
         seed,
         threads: settings::threads(request)?,
+        texture_memory: textures::memory(request)?,
         integrator: integrator.name().to_owned(),
         layers,
         optics,
         needs,
-        compression,
+        compression: driver.compression,
+        header: driver.header,
         carried,
         skipped,
         materials,
@@ -309,11 +307,15 @@ fn reasons(
             None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
         }
     }
-    note(
-        false,
-        "light sampling, emission, textures",
-        format!("the integrator '{}' has no use for them", integrator.name()),
-    );
+    textures::decide(scene, layers, needs, &mut note);
+    note(false, "light sampling, emission", format!("the integrator '{}' has no use for them", integrator.name()));
+    if scene.objects.hides_some() {
+        note(
+            true,
+            "what is hidden from the camera",
+            "its own rays pass through it; refracted and reflected ones meet it".into(),
+        );
+    }
     for (reason, count) in &scene.skipped {
         note(false, reason, format!("{count} left out by the bridge"));
     }

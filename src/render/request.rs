@@ -32,6 +32,8 @@ pub struct Request {
     pub seed: Option<u64>,
     /// Threads; all of the machine's if absent or 0. Never changes a bit of the image.
     pub threads: Option<usize>,
+    /// Memory for the texels of images, MB (10⁶ bytes); 4294 MB if absent. Never changes a bit of the image.
+    pub texture_memory: Option<u64>,
     /// Pixels to render: x0, y0, x1, y1, half-open, y down.
     pub crop: Option<[i32; 4]>,
     /// Samples to render: begin, end, half-open; aligned as [`is_aligned`](crate::film::sum::is_aligned) says.

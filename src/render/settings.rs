@@ -2,12 +2,11 @@
 
 use serde_json::Value;
 
-use super::plan::PlannedLayer;
 use super::request::Request;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::film::{SampleRange, aov, sum};
-use crate::integrator::{Optics, Registry};
+use crate::film::{SampleRange, sum};
+use crate::integrator::Optics;
 use crate::scene::Scene;
 use crate::scene::description::{Authored, AuthoredMap, Product};
 use crate::spectrum::{self, Wavelength};
@@ -18,21 +17,6 @@ const MAX_THREADS: usize = 1024;
 const SPECTRUM: [f64; 2] = [360.0, 830.0];
 /// AOV band unless chosen, nm.
 const DEFAULT_BAND: [f64; 2] = [400.0, 700.0];
-/// What `differentials` writes when nobody says what to write.
-const DEFAULT_AOVS: &[&str] = &[
-    "dispersion",
-    "dispersion_footprint",
-    "ddirection_dlambda",
-    "dposition_dlambda",
-    "ior",
-    "interfaces",
-    "depth",
-    "normal",
-    "position",
-    "refracted_position",
-    "prim_id",
-    "material_id",
-];
 
 pub(super) fn samples(request: &Request, attributes: &Attributes<'_>) -> Result<SampleRange> {
     let total = match request.samples {
@@ -108,107 +92,6 @@ pub(super) fn optics(request: &Request, attributes: &Attributes<'_>) -> Result<O
     Ok(Optics { reference, band, channels, dispersion_scale })
 }
 
-/// The integrator's name and the layers, from `--aov` or from the product's RenderVars.
-pub(super) fn layers(
-    request: &Request,
-    attributes: &Attributes<'_>,
-    product: Option<&Product>,
-    registry: &Registry,
-    diagnostics: &mut Diagnostics,
-) -> Result<(String, Vec<PlannedLayer>)> {
-    let chosen = match &request.integrator {
-        Some(name) => name.clone(),
-        None => attributes
-            .text("abbe:integrator")?
-            .filter(|name| !name.is_empty())
-            .unwrap_or_else(|| "differentials".to_owned()),
-    };
-    let offered = registry.find(&chosen)?.aovs();
-    let find = |name: &str| {
-        let canonical = aov::canonical_name(name);
-        offered.iter().copied().find(|aov| aov.name == canonical)
-    };
-    let unavailable = |name: &str| match aov::canonical_name(name) {
-        "color" => format!("the integrator '{chosen}' computes no light transport, so it has no '{name}'"),
-        _ => format!("the integrator '{chosen}' has no AOV '{name}'; `abbe aovs` lists what there is"),
-    };
-    let mut layers = Vec::new();
-    if let Some(names) = &request.aovs {
-        for name in names {
-            let aov = find(name).ok_or_else(|| Error::usage(format!("--aov {name}"), unavailable(name)))?;
-            if layers.iter().all(|layer: &PlannedLayer| layer.aov.name != aov.name) {
-                layers.push(PlannedLayer { aov, name: aov.name.to_owned() });
-            }
-        }
-        if layers.is_empty() {
-            return Err(Error::usage("--aov", "no AOV is asked for: name one, or leave the option out"));
-        }
-        return Ok((chosen, layers));
-    }
-    for var in product.map_or(&[][..], |p| &p.vars) {
-        let source = if var.source_name.is_empty() { &var.name } else { &var.source_name };
-        let Some(aov) = find(source) else {
-            diagnostics.warn("unavailable-render-var", &var.path, format!("{}: it is left out", unavailable(source)));
-            continue;
-        };
-        let text = |name: &str| var.driver.get(name).and_then(|a| a.value.as_str()).unwrap_or("");
-        let name = match text("name") {
-            "" => var.name.as_str(),
-            name => name,
-        };
-        let name = format!("{}{name}", text("channel_prefix"));
-        let format = text("format");
-        if !matches!(format, "" | "auto") && (format.contains("half") || format.ends_with('h')) {
-            diagnostics.warn(
-                "half-format",
-                &var.path,
-                "asks for half floats, which lose what a derivative is for: FLOAT is written",
-            );
-        }
-        if let Some(other) = layers.iter().find(|layer: &&PlannedLayer| layer.name == name) {
-            return Err(Error::scene(
-                &var.path,
-                format!(
-                    "its layer '{name}' is also that of '{}': give it another driver:parameters:aov:name",
-                    other.aov.name
-                ),
-            ));
-        }
-        layers.push(PlannedLayer { aov, name });
-    }
-    if layers.is_empty() {
-        layers = DEFAULT_AOVS
-            .iter()
-            .filter_map(|name| find(name))
-            .map(|aov| PlannedLayer { aov, name: aov.name.to_owned() })
-            .collect();
-        if layers.is_empty() {
-            layers = offered.into_iter().map(|aov| PlannedLayer { aov, name: aov.name.to_owned() }).collect();
-        }
-    }
-    Ok((chosen, layers))
-}
-
-/// EXR compression that the product asks for, if lossless; the default else.
-pub(super) fn compression(product: &Product, diagnostics: &mut Diagnostics) -> String {
-    let asked = ["OpenEXR:compression", "compression"]
-        .iter()
-        .find_map(|key| product.driver.get(*key))
-        .and_then(|a| a.value.as_str())
-        .unwrap_or("");
-    match asked {
-        "" | "zip" | "zips" | "piz" | "rle" | "none" => asked.to_owned(),
-        other => {
-            diagnostics.warn(
-                "compression",
-                &product.path,
-                format!("compression '{other}' would lose digits of derivatives: zip is written"),
-            );
-            String::new()
-        }
-    }
-}
-
 /// Authored `abbe:…` attributes, the product's before the settings'.
 pub(super) struct Attributes<'a> {
     maps: [Option<&'a AuthoredMap>; 2],
@@ -265,7 +148,7 @@ impl<'a> Attributes<'a> {
         }
     }
 
-    fn text(&self, name: &str) -> Result<Option<String>> {
+    pub(super) fn text(&self, name: &str) -> Result<Option<String>> {
         let Some(authored) = self.get(name) else { return Ok(None) };
         match authored.value.as_str() {
             Some(text) => Ok(Some(text.to_owned())),

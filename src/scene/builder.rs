@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::description::{self, Array, Description, Document, Element, Placement};
 use super::manifest::Manifest;
-use super::material::{self, Context, Material, ScalarIor};
+use super::material::{self, Context, Material, Resources, ScalarIor};
 use super::meshes;
 use super::objects::{Appearance, ConstantPrimvars, Object, ObjectArray, Objects, PartIds};
 use super::solids;
@@ -35,12 +35,14 @@ pub fn build(description: Description) -> Result<Scene> {
     let placed = || singles.iter().chain(prototypes.iter().flatten());
     let mut used = vec![false; document.shapes.len()];
     placed().for_each(|p| used[p.shape] = true);
-    let (materials, material_ids) = build_materials(document, placed(), &mut diagnostics)?;
-    let primvars = Vec::new();
+    let mut resources = Resources::new(&description);
+    let (materials, material_ids) = build_materials(document, placed(), &mut resources, &mut diagnostics)?;
+    let display_color = material::display_color(&mut resources);
+    let Resources { store: textures, primvars, .. } = resources;
     let mut has_interior = vec![false; document.shapes.len()];
     placed().for_each(|p| has_interior[p.shape] |= is_medium(p.placement, &materials, &material_ids));
-    let wanted =
-        used.iter().zip(&has_interior).map(|(&used, &asks_closed)| used.then_some(asks_closed)).collect::<Vec<_>>();
+    let wanted: Vec<_> =
+        used.iter().zip(&has_interior).map(|(&used, &asks_closed)| used.then_some(asks_closed)).collect();
     let (shapes, tree_time) = build_shapes(&description, &wanted, &primvars, &mut diagnostics)?;
 
     let mut compiler = Compiler {
@@ -101,8 +103,20 @@ pub fn build(description: Description) -> Result<Scene> {
         materials: materials.len() as u64,
     };
     let skipped = document.skipped.clone();
-    let tree_seconds = tree_time.as_secs_f64();
-    Ok(Scene { objects, materials, prims, instances, skipped, counts, tree_seconds, diagnostics, description })
+    let textures = Arc::new(textures);
+    Ok(Scene {
+        objects,
+        materials,
+        textures,
+        display_color,
+        prims,
+        instances,
+        skipped,
+        counts,
+        tree_seconds: tree_time.as_secs_f64(),
+        diagnostics,
+        description,
+    })
 }
 
 fn too_many(path: &str) -> Error {
@@ -468,6 +482,7 @@ impl<'a> NamedArrays<'a> {
 fn build_materials<'a>(
     document: &Document,
     placed: impl Iterator<Item = &'a Placed<'a>>,
+    resources: &mut Resources<'_>,
     diagnostics: &mut Diagnostics,
 ) -> Result<(Vec<Material>, Vec<u32>)> {
     let mut used = vec![false; document.materials.len()];
@@ -482,7 +497,7 @@ fn build_materials<'a>(
     let context = Context { scalar_ior: scalar_ior(document)?, meters_per_unit: document.stage.meters_per_unit };
     for (i, authored) in document.materials.iter().enumerate() {
         if used[i] {
-            materials.push(material::compile(authored, &context, diagnostics)?);
+            materials.push(material::compile(authored, &context, resources, diagnostics)?);
             ids[i] = materials.len() as u32;
         }
     }

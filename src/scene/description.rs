@@ -130,6 +130,9 @@ pub struct Stage {
     /// Frames per second of the stage.
     #[serde(default)]
     pub frames_per_second: Option<f64>,
+    /// Time codes per second of the stage.
+    #[serde(default)]
+    pub time_codes_per_second: Option<f64>,
     /// The interval about the frame in which motion was looked for; absent if it was not.
     #[serde(default)]
     pub motion: Option<[f64; 2]>,
@@ -497,6 +500,38 @@ pub struct Material {
     /// The surface shaders of the terminals after it, in the same order, each shader once.
     #[serde(default)]
     pub alternatives: Vec<Shader>,
+    /// The nodes behind inputs that are no constants, each behind those that it is connected to.
+    #[serde(default)]
+    pub nodes: Vec<Node>,
+}
+
+/// A node of a shading network as authored.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Node {
+    /// Prim path.
+    pub path: String,
+    /// `info:id`, for instance `UsdUVTexture` or `ND_multiply_color3`.
+    pub id: String,
+    /// Authored constant inputs by name without `inputs:`, connections to constants followed.
+    #[serde(default)]
+    pub inputs: AuthoredMap,
+    /// Inputs that other nodes drive.
+    #[serde(default)]
+    pub connected: BTreeMap<String, NodeOutput>,
+    /// Inputs that name an image: index into [`Document::textures`].
+    #[serde(default)]
+    pub textures: BTreeMap<String, usize>,
+}
+
+/// One output of a node.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NodeOutput {
+    /// Index into [`Material::nodes`]; of a node's input one before the node's own.
+    pub node: usize,
+    /// Name of the output without `outputs:`.
+    pub output: String,
 }
 
 /// A surface shader as authored.
@@ -516,6 +551,9 @@ pub struct Shader {
     /// Inputs driven by a network: name → the path of the output that drives it.
     #[serde(default)]
     pub connected: BTreeMap<String, String>,
+    /// The same inputs, to the nodes of the material that drive them.
+    #[serde(default)]
+    pub networks: BTreeMap<String, NodeOutput>,
     /// Authored `inputs:abbe:…`, keyed without `inputs:`, connections followed.
     #[serde(default)]
     pub abbe: AuthoredMap,
@@ -572,20 +610,25 @@ pub struct Camera {
     pub motion: Option<Motion>,
 }
 
-/// Exposure of a camera (UsdGeomCamera: `exposure`, `exposure:time` …).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// What is authored of a camera's exposure (UsdGeomCamera: `exposure`, `exposure:time` …).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exposure {
     /// Compensation, powers of 2.
-    pub stops: f64,
+    #[serde(default)]
+    pub stops: Option<f64>,
     /// Seconds.
-    pub time: f64,
+    #[serde(default)]
+    pub time: Option<f64>,
     /// Speed of the sensor.
-    pub iso: f64,
+    #[serde(default)]
+    pub iso: Option<f64>,
     /// The f-number that lets light in; that of the lens' blur is [`Camera::f_stop`].
-    pub f_stop: f64,
+    #[serde(default)]
+    pub f_stop: Option<f64>,
     /// Of the sensor.
-    pub responsivity: f64,
+    #[serde(default)]
+    pub responsivity: Option<f64>,
 }
 
 /// Render settings with their products flattened by the rules of UsdRenderComputeSpec.

@@ -5,8 +5,12 @@
 //! of a schema never decide, only authored values do, and what decided stands in [`Material::chosen`].
 
 mod absorption;
+mod appearance;
 mod dialect;
 mod law;
+mod network;
+mod nodes;
+mod resources;
 #[cfg(test)]
 mod tests;
 mod values;
@@ -17,9 +21,13 @@ use crate::optics::dispersion::{Dispersion, OutOfRange};
 use crate::optics::media::Priority;
 use crate::optics::{Absorption, Extinction, catalog};
 use crate::scene::description::{self, Shader};
+use crate::texture::{Builder, Program};
 
+pub use appearance::{Appearance, Below, Opacity};
 use dialect::{Glass, Response, Surface};
 use law::{Authored, StatedAbsorption};
+use network::Networks;
+pub(in crate::scene) use resources::Resources;
 use values::Values;
 
 /// From this weight on a surface counts as what the weight says: transmissive, metallic, present.
@@ -69,6 +77,8 @@ pub struct Material {
     pub kind: Kind,
     /// What decided the kind and the index, and why; one line for the plan.
     pub chosen: String,
+    /// What is looked up where a ray meets it.
+    pub appearance: Appearance,
 }
 
 impl Material {
@@ -127,22 +137,69 @@ impl Kind {
     }
 }
 
+/// The albedo of what has no material, as Hydra shows it: `displayColor`, or a grey.
+pub(super) fn display_color(resources: &mut Resources<'_>) -> Program {
+    let mut builder = Builder::default();
+    let mut compile = || {
+        let grey = builder.constant(appearance::UNSTATED)?;
+        let color = builder.primvar(resources.primvar("displayColor"), grey)?;
+        builder.program(color)
+    };
+    compile().expect("two operations are not too many")
+}
+
 /// Compiles what was authored. Errors name the prim and attribute, and what to author instead.
-pub fn compile(material: &description::Material, context: &Context, diagnostics: &mut Diagnostics) -> Result<Material> {
-    let (kind, chosen) = classify(material, context, diagnostics)?;
-    Ok(Material { path: material.path.clone(), kind, chosen })
+pub(super) fn compile(
+    material: &description::Material,
+    context: &Context,
+    resources: &mut Resources<'_>,
+    diagnostics: &mut Diagnostics,
+) -> Result<Material> {
+    let terminals: Vec<&Shader> = material.surface.iter().chain(&material.alternatives).collect();
+    let mut surface = terminals.iter().find_map(|shader| Surface::of(shader));
+    let mut networks = Networks::default();
+    if let Some(surface) = &mut surface {
+        networks = Networks::compile(surface.shader(), &material.nodes, resources)?;
+        surface.look_up(|name| networks.register(name).is_some());
+    }
+    let (kind, chosen) = classify(material, &terminals, surface.as_ref(), context, diagnostics)?;
+    let appearance = match &surface {
+        Some(surface) => {
+            let is_glass = matches!(kind, Kind::Dielectric { .. });
+            let opacity = surface.opacity(diagnostics)?;
+            Appearance::of(surface.shader(), &mut networks, is_glass, opacity, diagnostics)
+        }
+        None => Appearance::unstated(),
+    };
+    Ok(Material { path: material.path.clone(), kind, chosen, appearance })
+}
+
+/// A material by itself: nothing of it is an image.
+#[cfg(test)]
+fn compile_alone(
+    material: &description::Material,
+    context: &Context,
+    diagnostics: &mut Diagnostics,
+) -> Result<Material> {
+    let document = serde_json::json!({
+        "format": description::FORMAT, "version": description::VERSION,
+        "stage": {"source": "", "meters_per_unit": 1.0, "up_axis": "Y"},
+        "shapes": [], "groups": [], "root": 0, "materials": [], "cameras": [],
+    });
+    let document = serde_json::from_value(document).expect("is a document");
+    let description = description::Description { document, arrays: Default::default() };
+    compile(material, context, &mut Resources::new(&description), diagnostics)
 }
 
 fn classify(
     material: &description::Material,
+    terminals: &[&Shader],
+    surface: Option<&Surface<'_>>,
     context: &Context,
     diagnostics: &mut Diagnostics,
 ) -> Result<(Kind, String)> {
-    let terminals: Vec<&Shader> = material.surface.iter().chain(&material.alternatives).collect();
-    let surface = terminals.iter().find_map(|shader| Surface::of(shader));
-
     let mut places = vec![Values::new(&material.abbe, &material.path, "")];
-    if let Some(shader) = surface.as_ref().map(Surface::shader).or(material.surface.as_ref()) {
+    if let Some(shader) = surface.map(Surface::shader).or(material.surface.as_ref()) {
         places.push(Values::new(&shader.abbe, &shader.path, "inputs:"));
     }
     places.push(Values::new(&material.interface_abbe, &material.path, "inputs:"));
@@ -152,7 +209,7 @@ fn classify(
     let Some(surface) = surface else {
         let reason = match terminals[..] {
             [] => "no surface shader".to_owned(),
-            _ => warn_of_unknown(&terminals, diagnostics),
+            _ => warn_of_unknown(terminals, diagnostics),
         };
         warn_of_idle_law(material, &authored, &reason, diagnostics)?;
         return Ok((Kind::Opaque, format!("opaque: {reason}")));
@@ -162,11 +219,11 @@ fn classify(
     let (kind, reason) = match response {
         Response::Transmissive { why, rough, thin_walled } => {
             let (dispersion, source) =
-                dispersion(&surface, surface.shader(), &authored, context.scalar_ior, diagnostics)?;
+                dispersion(surface, surface.shader(), &authored, context.scalar_ior, diagnostics)?;
             let wall = if thin_walled { "thin-walled dielectric, followed straight through" } else { "dielectric" };
             let lobe = if rough { ", rough" } else { "" };
             let (absorption, fades) =
-                match absorption::absorption(&surface, &authored, thin_walled, context, diagnostics)? {
+                match absorption::absorption(surface, &authored, thin_walled, context, diagnostics)? {
                     Some((absorption, place)) => {
                         let fades = format!("; {} from {place}", absorption.describe());
                         (Some(absorption), fades)
@@ -181,7 +238,7 @@ fn classify(
             (Kind::Dielectric { dispersion, absorption, priority, rough, thin_walled }, chosen)
         }
         Response::Metal { why, rough } => {
-            let (conductor, source) = match conductor(&surface, &authored, diagnostics)? {
+            let (conductor, source) = match conductor(surface, &authored, diagnostics)? {
                 Some((conductor, source)) => (Some(conductor), format!("; n + ik from {source}")),
                 None => (None, String::new()),
             };
@@ -196,7 +253,7 @@ fn classify(
     if !uses_law {
         warn_of_idle_law(material, &authored, &reason, diagnostics)?;
     }
-    Ok((kind, format!("{reason}{}", passed_over(&terminals, surface.shader()))))
+    Ok((kind, format!("{reason}{}", passed_over(terminals, surface.shader()))))
 }
 
 /// Says that none of the terminals leads to a shader that is understood; returns it for the plan.

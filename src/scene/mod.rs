@@ -15,9 +15,11 @@ mod unroll;
 pub mod view;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
+use crate::texture::{Program, Store};
 use description::{Description, Document};
 pub use manifest::Manifest;
 use material::Material;
@@ -30,6 +32,10 @@ pub struct Scene {
     pub objects: Objects,
     /// Materials bound to some object, in the order of the description.
     pub materials: Vec<Material>,
+    /// Images that materials name.
+    pub textures: Arc<Store>,
+    /// The albedo of what has no material: the primvar `displayColor`.
+    pub display_color: Program,
     /// Prim paths behind `prim_id`.
     pub prims: Manifest,
     /// Instance paths behind `instance_id`.

@@ -5,12 +5,13 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use glam::{DAffine3, DVec3};
 
 use super::Scene;
-use super::material::{Kind, Material};
+use super::material::{Below, Kind, Material};
 use crate::error::{Error, Result};
 use crate::geometry::{Aggregate, Departures, Hit, Pose, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
 use crate::spectrum::Wavelength;
+use crate::texture::Program;
 
 /// The direction of the one fixed ray that finds the media around the camera: no axis or diagonal that scenes are built on.
 const PARITY_DIRECTION: DVec3 = DVec3::new(0.267_261_241_912_424_4, 0.534_522_483_824_848_8, 0.801_783_725_737_273_2);
@@ -32,6 +33,17 @@ impl FoundOut {
         }
         answer == Self::YES
     }
+}
+
+/// What a surface is at a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Presence {
+    /// As its material says.
+    AsStated,
+    /// Opaque, where its material is glass elsewhere.
+    Opaque,
+    /// Not there.
+    Absent,
 }
 
 /// A scene in render space: the stage's world with the camera at the origin.
@@ -147,6 +159,43 @@ impl<'a> View<'a> {
     /// The material at `hit`.
     pub fn material(&self, hit: &Hit) -> Option<&'a Material> {
         (self.material_id(hit) as usize).checked_sub(1).map(|i| &self.scene.materials[i])
+    }
+
+    /// The albedo of the surface at `hit`, whose material is `id` (1-based, 0 for none): linear Rec. 709.
+    pub fn albedo(&self, hit: &Hit, id: u32) -> [f64; 3] {
+        let program = match id.checked_sub(1) {
+            Some(index) => &self.scene.materials[index as usize].appearance.albedo,
+            None => &self.scene.display_color,
+        };
+        let [r, g, b, _] = self.evaluate(program, hit);
+        [r, g, b].map(f64::from)
+    }
+
+    /// Whether the surface at `hit`, whose material is `id`, is as its material says, something else, or not there.
+    pub fn presence(&self, hit: &Hit, id: u32) -> Presence {
+        let Some(index) = id.checked_sub(1) else { return Presence::AsStated };
+        let material = &self.scene.materials[index as usize];
+        match (&material.kind, &material.appearance.opacity) {
+            (Kind::PassThrough, _) => Presence::Absent,
+            (_, None) => Presence::AsStated,
+            (_, Some(opacity)) => {
+                // A value that is no number is not below anything.
+                let is_below = self.evaluate(&opacity.program, hit)[0] < opacity.limit;
+                match (opacity.below, is_below) {
+                    (Below::CutOut, true) => Presence::Absent,
+                    (Below::Glass, false) => Presence::Opaque,
+                    _ => Presence::AsStated,
+                }
+            }
+        }
+    }
+
+    fn evaluate(&self, program: &Program, hit: &Hit) -> [f32; 4] {
+        program.at(&self.scene.textures, |number| {
+            let number = number as usize;
+            let over_shape = self.aggregate.primvar(hit, number);
+            over_shape.or_else(|| self.scene.objects.primvar(hit.instance, number))
+        })
     }
 
     /// The medium behind the surface at `hit`, if its material `id` (1-based) fills a volume.

@@ -5,17 +5,19 @@
 //! constants is computed when the program is built. Arithmetic is in f32 with the functions of `libm`, so that programs
 //! give the same bits everywhere.
 
-use super::sample::Lookup;
+use super::sample::{Images, Lookup};
 use super::store::Store;
 
 /// The longest program.
 pub const MAX_OPERATIONS: usize = 256;
+/// The most operations of all programs of one builder.
+const MAX_ALL: usize = 4096;
 
 /// The result of an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register(u16);
 
-/// A program would be longer than [`MAX_OPERATIONS`].
+/// A program would be longer than [`MAX_OPERATIONS`], or all of a builder together too long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLarge;
 
@@ -191,7 +193,7 @@ impl Builder {
     }
 
     /// The program whose result is `root`: what it needs of the operations, and no more.
-    pub fn program(&self, root: Register) -> Program {
+    pub fn program(&self, root: Register) -> Result<Program, TooLarge> {
         let root = usize::from(root.0);
         let mut needed = vec![false; root + 1];
         needed[root] = true;
@@ -222,7 +224,7 @@ impl Builder {
             place[i] = Register(program.operations.len() as u16);
             program.operations.push(moved);
         }
-        program
+        if program.operations.len() > MAX_OPERATIONS { Err(TooLarge) } else { Ok(program) }
     }
 
     fn push(&mut self, operation: Operation) -> Result<Register, TooLarge> {
@@ -230,7 +232,7 @@ impl Builder {
         if let Some(known) = self.operations.iter().position(|other| *other == operation) {
             return Ok(Register(known as u16));
         }
-        if self.operations.len() == MAX_OPERATIONS {
+        if self.operations.len() == MAX_ALL {
             return Err(TooLarge);
         }
         self.operations.push(operation);
@@ -389,9 +391,12 @@ impl Program {
         }
     }
 
-    /// The images that it looks up.
-    pub fn lookups(&self) -> &[Lookup] {
-        &self.lookups
+    /// The numbers of the images that it looks up.
+    pub fn images(&self) -> impl Iterator<Item = u32> {
+        self.lookups.iter().flat_map(|lookup| match &lookup.images {
+            Images::Single(number) => vec![*number],
+            Images::Tiles(tiles) => tiles.iter().map(|tile| tile.1).collect(),
+        })
     }
 
     /// The value where `primvar` gives the primvars by their numbers.
@@ -422,10 +427,10 @@ mod tests {
         let two = builder.number(2.0).unwrap();
         let three = builder.number(3.0).unwrap();
         let six = builder.binary(Function::Multiply, two, three).unwrap();
-        assert_eq!(builder.program(six).as_constant(), Some([6.0; 4]));
+        assert_eq!(builder.program(six).unwrap().as_constant(), Some([6.0; 4]));
         let st = builder.primvar(0, two).unwrap();
         let sum = builder.binary(Function::Add, st, six).unwrap();
-        let program = builder.program(sum);
+        let program = builder.program(sum).unwrap();
         assert_eq!(program.operations.len(), 4, "{program:?}");
         assert_eq!(program.at(&Store::default(), |_| Some([1.0, 2.0, 0.0, 0.0])), [7.0, 8.0, 6.0, 6.0]);
         assert_eq!(program.at(&Store::default(), |_| None), [8.0; 4]);
@@ -436,12 +441,18 @@ mod tests {
         let mut builder = Builder::default();
         let one = builder.number(1.0).unwrap();
         let mut last = builder.primvar(0, one);
-        for i in 0..2 * MAX_OPERATIONS {
+        for i in 0..2 * MAX_ALL {
             let Ok(register) = last else { break };
             let number = builder.number(i as f32).unwrap_or(one);
             last = builder.binary(Function::Add, register, number);
+            assert_eq!(last.is_ok() && builder.program(last.unwrap()).is_ok(), 2 * i + 4 <= MAX_OPERATIONS);
+            if i > MAX_OPERATIONS {
+                // Only the length of all counts from here.
+                break;
+            }
         }
-        assert_eq!(last, Err(TooLarge));
+        let all = (0..2 * MAX_ALL).map(|i| builder.number(-(i as f32))).find(Result::is_err);
+        assert_eq!(all, Some(Err(TooLarge)));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::collections::{HashMap, VecDeque};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 
 use bytes::Bytes;
@@ -106,6 +106,7 @@ pub struct Store {
     resident: AtomicU64,
     read: AtomicU64,
     file_bytes: AtomicU64,
+    failed: AtomicBool,
     spilled: OnceLock<Spill>,
 }
 
@@ -152,6 +153,11 @@ impl Store {
         self.slots.iter().filter_map(failed).collect()
     }
 
+    /// Whether some image that was looked up could not be read.
+    pub fn has_failed(&self) -> bool {
+        self.failed.load(Ordering::Relaxed)
+    }
+
     /// Counts so far.
     pub fn counts(&self) -> TextureCounts {
         let spilled_bytes = self.spilled.get().map_or(0, |spill| spill.lock().end);
@@ -167,7 +173,12 @@ impl Store {
     /// The image with a number, read if it has not been; `None` if it cannot be read.
     pub(super) fn image(&self, number: u32) -> Option<&Image> {
         let slot = &self.slots[number as usize];
-        slot.image.get_or_init(|| self.load(slot)).as_ref().ok()
+        let load = || {
+            let image = self.load(slot);
+            self.failed.fetch_or(image.is_err(), Ordering::Relaxed);
+            image
+        };
+        slot.image.get_or_init(load).as_ref().ok()
     }
 
     fn load(&self, slot: &Slot) -> Result<Image, String> {

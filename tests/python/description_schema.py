@@ -151,6 +151,13 @@ def _check_arrays(document, arrays):
                 if primvar.get("indices") is not None:
                     array(primvar["indices"], np.int32, 1, where)
                 assert primvar["interpolation"] in ("constant", "uniform", "varying", "vertex", "faceVarying")
+        for name, primvar in mesh.get("primvars", {}).items():
+            values = arrays[primvar["values"]]
+            columns = 1 if values.ndim == 1 else values.shape[1]
+            assert columns <= 4 and name != mesh.get("uv_name"), f"{where}: {name}"
+            array(primvar["values"], np.float32, columns, where)
+            if primvar.get("indices") is not None:
+                array(primvar["indices"], np.int32, 1, where)
         subdivision = mesh.get("subdivision") or {}
         for name in ("crease_indices", "crease_lengths", "corner_indices"):
             if name in subdivision:

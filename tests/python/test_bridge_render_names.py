@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("pxr.Usd", reason="the bridge needs usd-core")
 
-from abbe.usd.render import expand_frame_tokens
+from abbe.frame_tokens import expand_frame_tokens
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,7 @@ def test_stage_metadata_is_as_authored(geometry):
         "up_axis": "Z",
         "time_code": 3.0,
         "frames_per_second": 25.0,
+        "time_codes_per_second": 25.0,
     }
 
 
@@ -324,6 +325,7 @@ def test_a_camera_crosses_as_authored():
         "vertical_aperture_offset": 0.0,
         "focal_length": 20.0,
         "clipping_range": [0.5, 500.0],
+        "clipping_authored": True,
         "f_stop": float(np.float32(2.8)),
         "focus_distance": 12.0,
         "shutter_open": -0.25,
@@ -703,7 +705,8 @@ def test_odd_stage_metadata_is_repaired_with_a_warning():
     assert description.document["stage"]["meters_per_unit"] == 0.01
     assert description.document["stage"]["up_axis"] == "Y"
     assert len(warned(description, "unreadable-attribute")) == 2
-    assert describe(in_memory("")).document["stage"] == {"source": "test.usda", "meters_per_unit": 0.01, "up_axis": "Y"}
+    fallbacks = {"source": "test.usda", "meters_per_unit": 0.01, "up_axis": "Y", "time_codes_per_second": 24.0}
+    assert describe(in_memory("")).document["stage"] == fallbacks
 
 
 def test_without_usd_the_error_says_what_to_install():

@@ -41,6 +41,7 @@ impl Stagehand {
                 up_axis: "Y".into(),
                 time_code: None,
                 frames_per_second: Some(24.0),
+                time_codes_per_second: Some(24.0),
                 motion: None,
             },
             shapes: vec![],
@@ -69,9 +70,11 @@ impl Stagehand {
                 terminal: "outputs:surface".into(),
                 inputs: map(inputs),
                 connected: BTreeMap::new(),
+                networks: BTreeMap::new(),
                 abbe: BTreeMap::new(),
             }),
             alternatives: Vec::new(),
+            nodes: Vec::new(),
         });
         self.document.materials.len() - 1
     }

@@ -16,13 +16,15 @@ def add(commands: Any) -> None:
     options.add_stage(parser)
     parser.add_argument("out", metavar="SCENE.safetensors", help="the file to write")
     group = parser.add_argument_group("what goes into the scene")
-    group.add_argument("--camera", "-cam", metavar="P", help="path of a camera, or its name")
-    group.add_argument(
-        "--render-settings", "--renderSettingsPrimPath", "-rs", metavar="P", help="path of a RenderSettings prim"
-    )
+    options.add_settings(group)
     group.add_argument("--product", metavar="P", help="path of the one RenderProduct to keep")
     options.add_scalar_ior(group)
     group.add_argument("--strict", action="store_true", help="a stage without a camera is an error")
+    group.add_argument(
+        "--embed",
+        action="store_true",
+        help="put what is in the texture files into the scene",
+    )
     options.add_quiet(parser)
     parser.set_defaults(run=run)
 
@@ -31,5 +33,5 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     if Path(args.out).suffix != options.SCENE_SUFFIX:
         raise UsageError(f"{args.out}: must end with {options.SCENE_SUFFIX}")
-    options.open_scene(args, options.frame(args)).save(args.out)
+    options.open_scene(args, options.frame(args)).save(args.out, embed=args.embed)
     return 0

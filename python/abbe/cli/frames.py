@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from ..errors import UsageError
+from ..frame_tokens import expand_frame_tokens, has_frame_token
 
 __all__ = ["MOST_FRAMES", "has_placeholder", "name_for", "parse"]
 
@@ -76,17 +77,20 @@ _PLACEHOLDER = re.compile(r"(?P<whole>#+)(?P<fraction>\.#+)?")
 
 def has_placeholder(name: str) -> bool:
     """Tell whether a file name has a place for the frame."""
-    return "#" in name
+    return has_frame_token(name)
 
 
-def name_for(name: str, frame: float | Literal["default"] | None, option: str) -> str:
-    """Return the file name with the frame in its place.
+def name_for(
+    name: str, frame: float | Literal["default"] | None, option: str, product: str = "", ordinal: int = 0
+) -> str:
+    """Return the file name with the frame and the product in their places.
 
     Parameters
     ----------
-    name : such as ``out.####.exr``
+    name : such as ``out.####.exr``, ``out.$F4.exr`` or ``<OS>.<F4>.exr``
     frame : the time code that is rendered
     option : whose name it is, for errors
+    product, ordinal : name of the product's prim, and its place among the products
 
     Raises
     ------
@@ -94,20 +98,21 @@ def name_for(name: str, frame: float | Literal["default"] | None, option: str) -
         There are several places, or no frame to put there, or the frame does not fit.
     """
     places = list(_PLACEHOLDER.finditer(name))
-    if not places:
-        return name
     if len(places) > 1:
         raise UsageError(f"{option} {name}: has several places for the frame (#): leave one")
-    if not isinstance(frame, float):
+    if has_placeholder(name) and not isinstance(frame, float):
         raise UsageError(
-            f"{option} {name}: has a place for the frame (#), but there is none: give --frames, or a plain name"
+            f"{option} {name}: has a place for the frame, but there is none: give --frames, or a plain name"
         )
+    if not places or not isinstance(frame, float):
+        return expand_frame_tokens(name, frame if isinstance(frame, float) else 0.0, product, ordinal)
     match = places[0]
     digits = len(match["fraction"] or ".") - 1
     if abs(round(frame, digits) - frame) > _ROUNDING * max(1.0, abs(frame)):
         raise UsageError(f"{option} {name}: frame {frame:g} does not fit: add .# after the hashes for its fraction")
     text = f"{frame:0{len(match[0])}.{digits}f}"
-    return name[: match.start()] + text + name[match.end() :]
+    before, after = name[: match.start()], name[match.end() :]
+    return "".join(expand_frame_tokens(part, frame, product, ordinal) for part in (before, text, after))
 
 
 def need_placeholder(name: str, frames: Sequence[object], option: str) -> None:

@@ -15,6 +15,7 @@ __all__ = [
     "add_quiet",
     "add_request",
     "add_scalar_ior",
+    "add_settings",
     "add_stage",
     "numbers",
     "open_scene",
@@ -129,7 +130,7 @@ def add_stage(parser: argparse.ArgumentParser, time: bool = True, scene_file: bo
         "--missing",
         choices=("warn", "error"),
         default="warn",
-        help="what a missing layer or reference is; warn unless given",
+        help="what a missing layer, reference or texture is; warn unless given",
     )
     group.add_argument(
         "--complexity",
@@ -148,19 +149,36 @@ def add_scalar_ior(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def add_request(parser: argparse.ArgumentParser) -> None:
-    """Add what to render."""
-    group = parser.add_argument_group("the image (what is not given, the stage's render settings decide)")
+def add_settings(group: argparse._ArgumentGroup) -> None:
+    """Add which camera and which render settings."""
     group.add_argument("--camera", "-cam", metavar="P", help="path of a camera, or its name")
     group.add_argument(
         "--render-settings", "--renderSettingsPrimPath", "-rs", metavar="P", help="path of a RenderSettings prim"
     )
+    group.add_argument(
+        "--render-pass",
+        "--renderPassPrimPath",
+        "-rp",
+        metavar="P",
+        help="path of a RenderPass prim: its render settings, and what it shows, hides and prunes",
+    )
+
+
+def add_request(parser: argparse.ArgumentParser) -> None:
+    """Add what to render."""
+    group = parser.add_argument_group("the image (what is not given, the stage's render settings decide)")
+    add_settings(group)
     group.add_argument("--product", metavar="P", help="path of the one RenderProduct to render")
     group.add_argument(
         "--width", "--imageWidth", "-w", type=int, metavar="N", help="pixels; alone, it keeps the aspect"
     )
     group.add_argument("--height", type=int, metavar="N", help="pixels; alone, it keeps the aspect")
     group.add_argument("--samples", type=int, metavar="N", help="samples per pixel")
+    group.add_argument(
+        "--depth-of-field",
+        choices=("on", "off"),
+        help="spread samples over the camera's lens, or not; as the stage says unless given",
+    )
     group.add_argument("--integrator", metavar="NAME", help="what computes a pixel; `abbe aovs` lists them")
     group.add_argument(
         "--aov", action="append", metavar="NAME", help="an AOV to render, instead of the stage's; repeat for more"
@@ -179,6 +197,12 @@ def add_request(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--seed", type=int, metavar="N", help="same seed, same bits")
     group.add_argument(
         "--threads", type=int, metavar="N", help="all of the machine's unless given; never changes a bit"
+    )
+    group.add_argument(
+        "--texture-memory",
+        type=int,
+        metavar="MB",
+        help="for texels, 4294 unless given; what does not fit goes to a temporary file; never changes a bit",
     )
     group.add_argument(
         "--crop",
@@ -201,6 +225,7 @@ def request(args: argparse.Namespace, from_stage: bool) -> Options:
         width=args.width,
         height=args.height,
         samples=args.samples,
+        depth_of_field=None if args.depth_of_field is None else args.depth_of_field == "on",
         integrator=args.integrator,
         aovs=args.aov,
         wavelength=args.wavelength,
@@ -208,6 +233,7 @@ def request(args: argparse.Namespace, from_stage: bool) -> Options:
         dispersion_scale=args.dispersion_scale,
         seed=args.seed,
         threads=args.threads,
+        texture_memory=args.texture_memory,
         crop=args.crop,
         sample_range=args.sample_range,
         strict=args.strict,
@@ -249,6 +275,8 @@ def frame(args: argparse.Namespace) -> float | Literal["default"] | None:
 def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None) -> Scene:
     """Load the stage, or the scene file, at a time code."""
     messages.show_warnings(getattr(args, "quiet", False))
+    if args.render_pass is not None and args.render_settings is not None:
+        raise UsageError("--render-pass: it says which settings it renders: leave --render-settings out")
     if not is_scene_file(args):
         try:
             return Scene.from_stage(
@@ -256,6 +284,7 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
                 frame=time,
                 camera=args.camera,
                 render_settings=args.render_settings,
+                render_pass=args.render_pass,
                 product=args.product,
                 purposes=args.purposes,
                 variants=args.variant,
@@ -274,6 +303,7 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
     given = {
         "--frame, --frames, --defaultTime": time is not None,
         "--render-settings": args.render_settings is not None,
+        "--render-pass": args.render_pass is not None,
         "--purposes": args.purposes is not None,
         "--variant": bool(args.variant),
         "--set": bool(args.overrides),

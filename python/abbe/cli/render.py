@@ -16,6 +16,7 @@ from .._core import Film
 from .._files import replacing
 from .._memory import peak_memory
 from ..errors import AbbeError, UsageError
+from ..frame_tokens import has_product_token
 from . import frames, messages, options
 from .progress import Reporter
 
@@ -32,8 +33,10 @@ def add(commands: Any) -> None:
         "out",
         nargs="?",
         metavar="OUT",
-        help="the .exr to write, instead of the stage's one product; #### is the frame",
+        help="the .exr to write, instead of the stage's one product; #### (or $F4, <F4>, %%04d) is the frame, and with "
+        "<OS> or <N>, a product's name or number, it names several products",
     )
+    parser.add_argument("--output", "-o", dest="out_option", metavar="OUT", help="the same as OUT")
     group = parser.add_argument_group("frames")
     group.add_argument(
         "--frames",
@@ -45,6 +48,9 @@ def add(commands: Any) -> None:
         "--defaultTime", "-d", dest="default_time", action="store_true", help="read default values, not time samples"
     )
     options.add_request(parser)
+    group = parser.add_argument_group("accepted from scripts that call usdrecord")
+    group.add_argument("--disableGpu", action="store_true", help="there is no other way: abbe renders on the CPU")
+    group.add_argument("--disableCameraLight", action="store_true", help="there is no such light")
     group = parser.add_argument_group("reports")
     group.add_argument("--stats", metavar="FILE.json", help="write what was counted, chosen and warned of")
     group.add_argument("--preview", metavar="FILE.png", help="write a picture of the layers in false colour")
@@ -87,11 +93,15 @@ def _outputs(scene: Scene, args: argparse.Namespace, time: Time, request: Option
     """Return the file of each plan."""
     plans = scene.plans(**request)
     if args.out is not None:
-        if len(plans) > 1:
+        if len(plans) > 1 and not has_product_token(args.out):
             names = ", ".join(plan.product for plan in plans)
             raise UsageError(f"OUT {args.out}: the stage has {len(plans)} products: choose one with --product: {names}")
         stage_time = scene.document["stage"].get("time_code")
-        outputs = [frames.name_for(args.out, stage_time if time is None else time, "OUT")]
+        frame = stage_time if time is None else time
+        outputs = [
+            frames.name_for(args.out, frame, "OUT", plan.product.rpartition("/")[2], ordinal)
+            for ordinal, plan in enumerate(plans)
+        ]
     else:
         outputs = [plan.output for plan in plans]
         for plan in plans:
@@ -150,6 +160,10 @@ def _write_statistics(path: str, outcome: _Outcome) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     times = _times(args)
+    if args.out_option is not None:
+        if args.out is not None:
+            raise UsageError(f"--output {args.out_option}: OUT {args.out} is given too: give one of them")
+        args.out = args.out_option
     outcome = _Outcome()
     if args.out is not None:
         frames.need_placeholder(args.out, times, "OUT")

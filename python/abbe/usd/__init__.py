@@ -24,6 +24,7 @@ def describe(
     frame: float | Literal["default"] | None = None,
     camera: str | None = None,
     render_settings: str | None = None,
+    render_pass: str | None = None,
     product: str | None = None,
     purposes: Sequence[str] | None = None,
     variants: Sequence[str] = (),
@@ -45,6 +46,7 @@ def describe(
     frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
     camera : path of a Camera, or the name of the first; it then replaces the cameras that products name
     render_settings : path of a RenderSettings prim; the stage's own, or its only one, if None
+    render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
     product : path or name of the one RenderProduct to keep
     purposes : of default, render, proxy, guide (default always counts); the settings', else default and render, if None
     variants : selections such as ``"/World/Ball{material=glass}"``
@@ -53,7 +55,7 @@ def describe(
     session_layer : a layer stronger than all of the stage, which is not changed
     mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
     payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
-    missing : what to do where a layer or prim that is referred to is missing: ``"warn"`` or ``"error"``
+    missing : what to do where a layer, prim or texture that is referred to is missing: ``"warn"`` or ``"error"``
     complexity : ``"low"``, ``"medium"``, ``"high"`` or ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
         ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
     scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
@@ -82,6 +84,7 @@ def describe(
         frame=frame,
         camera=camera,
         render_settings=render_settings,
+        render_pass=render_pass,
         product=product,
         purposes=purposes,
         variants=variants,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -105,7 +106,33 @@ def read_camera(prim: Any, time: Any, transforms: Any) -> dict[str, Any]:
             raise StageError(f"{place(prim)}.{name} = {clipping}: is no range: give it a near and a far distance")
         # An infinite far plane is as good as the farthest that the attribute can hold.
         result["clipping_range"] = [float(numbers[0]), min(float(numbers[1]), _FARTHEST)]
+        result["clipping_authored"] = bool(camera.GetClippingRangeAttr().HasAuthoredValue())
+    planes = _clipping_planes(prim, camera, time)
+    if planes:
+        result["clipping_planes"] = planes
+    exposure = _exposure(prim, number)
+    if exposure:
+        result["exposure"] = exposure
     return result
+
+
+def _clipping_planes(prim: Any, camera: Any, time: Any) -> list[list[float]]:
+    """Return the planes (a, b, c, d) that cut off what has a x + b y + c z + d < 0 in camera space."""
+    name = camera.GetClippingPlanesAttr().GetName()
+    value = read(prim, name, time)
+    planes = np.asarray([] if value is None else value, dtype=np.float64)
+    if planes.size == 0:
+        return []
+    if planes.ndim != 2 or planes.shape[1] != 4 or not np.isfinite(planes).all():
+        raise StageError(f"{place(prim)}.{name}: are no planes of four finite numbers: correct the value")
+    result: list[list[float]] = planes.tolist()
+    return result
+
+
+def _exposure(prim: Any, number: Callable[[Any, float], float]) -> dict[str, float]:
+    """Return what is authored of a camera's exposure."""
+    attributes = ((name, prim.GetAttribute(attribute)) for attribute, name in tokens.EXPOSURE.items())
+    return {name: number(a, 0.0) for name, a in attributes if a and a.HasAuthoredValue()}
 
 
 # The largest float32, which is what UsdGeomCamera's clippingRange can hold.

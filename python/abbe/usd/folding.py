@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from . import tokens
@@ -27,6 +27,13 @@ class Driver:
 
     path: str
     """Path of the output."""
+    shader: Any = field(default=None, compare=False)
+    """The prim of the node."""
+
+    @property
+    def output(self) -> str:
+        """The output's name without ``outputs:``."""
+        return self.path.rpartition(".")[2].removeprefix(tokens.OUTPUTS_PREFIX)
 
 
 class _DrivenError(Exception):
@@ -115,7 +122,7 @@ class Network:
         # A schema's fallback is not what somebody said.
         if data is None or not attribute.HasAuthoredValue():
             return None
-        return Value(str(attribute.GetTypeName()), data)
+        return Value(str(attribute.GetTypeName()), data, attribute)
 
     def _follow(self, attribute: Any) -> tuple[list[Any], tuple[Any, str] | None]:
         """Follow connections through containers, from ``attribute`` to a shader's output.
@@ -149,7 +156,7 @@ class Network:
     def _output(self, shader: Any, name: str) -> Value | Driver:
         """Return what an output of a shader is."""
         path = shader.GetPath().AppendProperty(name)
-        driver = Driver(str(path))
+        driver = Driver(str(path), shader)
         known = self._outputs.get(path)
         if known is not None:
             return known

@@ -125,9 +125,12 @@ class ShapeReader:
         normals = self._normals(prim, name, subdivision is not None)
         if normals is not None:
             mesh["normals"] = normals
-        uv = self._uv(prim, name)
+        uv = self._uv(prim)
         if uv is not None:
-            mesh["uv"] = uv
+            values = self.primvar(prim, uv, f"{name}.uv", 2)
+            if values is not None:
+                mesh["uv"] = values
+                mesh["uv_name"] = uv.GetName()[len(tokens.PRIMVARS_PREFIX) :]
         mesh["subsets"] = self._subsets(prim, name)
         return {"mesh": mesh}
 
@@ -178,14 +181,14 @@ class ShapeReader:
                 'subdivisionScheme = "none" where a polygon mesh is meant',
             )
             return None
-        return self._primvar(prim, attribute, f"{name}.normals", 3)
+        return self.primvar(prim, attribute, f"{name}.normals", 3)
 
-    def _uv(self, prim: Any, name: str) -> dict[str, Any] | None:
-        """Return ``primvars:st``, else the texture coordinates that an application named differently."""
+    def _uv(self, prim: Any) -> Any:
+        """Return the attribute ``primvars:st``, else the texture coordinates that an application named differently."""
         attribute = prim.GetAttribute(tokens.PRIMVARS_ST)
         if not (attribute and attribute.HasAuthoredValue()):
             attribute = self._other_uv(prim)
-        return None if attribute is None else self._primvar(prim, attribute, f"{name}.uv", 2)
+        return attribute
 
     def _other_uv(self, prim: Any) -> Any:
         candidates: list[tuple[int, str, Any]] = []
@@ -200,7 +203,8 @@ class ShapeReader:
         # By role first, then by name: the order does not depend on the order of authoring.
         return min(candidates, key=lambda c: c[:2])[2] if candidates else None
 
-    def _primvar(self, prim: Any, attribute: Any, array_name: str, columns: int) -> dict[str, Any] | None:
+    def primvar(self, prim: Any, attribute: Any, array_name: str, columns: int) -> dict[str, Any] | None:
+        """Return values over a mesh as the description has them; None, with a warning, where they are unusable."""
         name = attribute.GetName()
         values = self._floats(prim, name, columns)
         if values is None:

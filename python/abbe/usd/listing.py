@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Unpack
 
 from . import tokens
-from ._pxr import UsdGeom
+from ._pxr import UsdGeom, UsdRender
 from .cameras import all_cameras, read_camera
 from .composition import quiet_usd
 from .description import Diagnostics
@@ -40,6 +40,10 @@ class VarInfo:
     source_name: str
     source_type: str
     data_type: str
+    layer: str
+    """What the EXR layer is called: ``driver:parameters:aov:name``, else the prim's name."""
+    format: str
+    """``driver:parameters:aov:format``; empty where none is authored."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,14 @@ class ProductInfo:
     """None where neither the product nor its settings author one."""
     camera: str | None
     vars: tuple[VarInfo, ...]
+    pixel_aspect_ratio: float
+    aspect_ratio_conform_policy: str
+    data_window_ndc: tuple[float, float, float, float]
+    """xmin, ymin, xmax, ymax, y up."""
+    disable_depth_of_field: bool
+    disable_motion_blur: bool
+    driver: tuple[tuple[str, Any], ...]
+    """Authored ``driver:parameters:…``, without that prefix."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +78,8 @@ class SettingsInfo:
     camera: str | None
     purposes: tuple[str, ...]
     products: tuple[ProductInfo, ...]
+    passes: tuple[str, ...]
+    """Paths of the RenderPass prims that render these settings."""
 
 
 def cameras(stage_or_path: Any, *, frame: float | str | None, **opening: Unpack[Opening]) -> list[CameraInfo]:
@@ -94,6 +108,7 @@ def settings(stage_or_path: Any, *, frame: float | str | None, **opening: Unpack
         time, time_code = stage_time(stage, frame)
         default = find_settings(stage, None, source)
         found = []
+        passes = _passes(stage)
         for prim in all_settings(stage):
             seen: list[str] = []
 
@@ -102,11 +117,46 @@ def settings(stage_or_path: Any, *, frame: float | str | None, **opening: Unpack
                 return len(seen) - 1
 
             document = read_settings(stage, prim, time, time_code or 0.0, None, index, False, source, diagnostics)
-            found.append(_settings_info(prim, document, seen, prim == default))
+            passes_of_it = passes.get(str(prim.GetPath()), [])
+            found.append(_settings_info(prim, document, seen, prim == default, passes_of_it))
         return found
 
 
-def _settings_info(prim: Any, document: dict[str, Any], cameras_seen: list[str], is_default: bool) -> SettingsInfo:
+_AS_THEY_ARE = (
+    "pixel_aspect_ratio",
+    "aspect_ratio_conform_policy",
+    "disable_depth_of_field",
+    "disable_motion_blur",
+)
+
+
+def _var_info(var: dict[str, Any]) -> VarInfo:
+    names = ("path", "name", "source_name", "source_type", "data_type")
+
+    def parameter(name: str) -> str:
+        return str(var["driver"].get(name, {}).get("value", ""))
+
+    return VarInfo(
+        **{name: var[name] for name in names},
+        layer=parameter("channel_prefix") + (parameter("name") or var["name"]),
+        format=parameter("format"),
+    )
+
+
+def _passes(stage: Any) -> dict[str, list[str]]:
+    """Return the RenderPass prims of a stage by the path of the settings that they render."""
+    found: dict[str, list[str]] = {}
+    for prim in stage.Traverse():
+        relationship = prim.GetRelationship(tokens.RENDER_SOURCE) if prim.IsA(UsdRender.Pass) else None
+        targets = relationship.GetForwardedTargets() if relationship else []
+        if targets:
+            found.setdefault(str(targets[0]), []).append(str(prim.GetPath()))
+    return found
+
+
+def _settings_info(
+    prim: Any, document: dict[str, Any], cameras_seen: list[str], is_default: bool, passes: list[str]
+) -> SettingsInfo:
     def camera_of(product: dict[str, Any]) -> str | None:
         return cameras_seen[product["camera"]] if "camera" in product else None
 
@@ -120,10 +170,10 @@ def _settings_info(prim: Any, document: dict[str, Any], cameras_seen: list[str],
             product_type=product["product_type"],
             resolution=resolution_of(product),
             camera=camera_of(product),
-            vars=tuple(
-                VarInfo(**{name: var[name] for name in ("path", "name", "source_name", "source_type", "data_type")})
-                for var in product["vars"]
-            ),
+            vars=tuple(_var_info(var) for var in product["vars"]),
+            data_window_ndc=tuple(product["data_window_ndc"]),
+            driver=tuple((name, value["value"]) for name, value in sorted(product["driver"].items())),
+            **{name: product[name] for name in _AS_THEY_ARE},
         )
         for product in document["products"]
     )
@@ -136,4 +186,5 @@ def _settings_info(prim: Any, document: dict[str, Any], cameras_seen: list[str],
         camera=camera_of(base),
         purposes=tokens.DEFAULT_PURPOSES if purposes is None else tuple(purposes),
         products=products,
+        passes=tuple(passes),
     )

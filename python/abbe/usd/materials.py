@@ -6,15 +6,17 @@ a layer holds it; declared inputs without a value mean the shader's own default 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import PurePosixPath
 from typing import Any
 
 from . import tokens
 from ._pxr import Usd, UsdGeom, UsdShade
+from .assets import AssetReader
 from .description import Diagnostics
 from .folding import Driver, Network
+from .networks import NodeReader
 from .values import authored_namespace, place, plain
 
 __all__ = ["MaterialReader", "warn_unknown_names"]
@@ -34,25 +36,28 @@ def warn_unknown_names(
 class MaterialReader:
     """Reads bound materials, each prototype's once."""
 
-    def __init__(self, time: Any, diagnostics: Diagnostics, purpose: str) -> None:
+    def __init__(self, time: Any, diagnostics: Diagnostics, purposes: Sequence[str], assets: AssetReader) -> None:
+        """Read materials at ``time``; the first of ``purposes`` counts for which a prim has a binding."""
         self._time = time
+        self._assets = assets
         self._diagnostics = diagnostics
-        self._purpose = purpose
+        self._purposes = tuple(purposes)
         self._index_by_prim: dict[Any, int] = {}
         self._users: list[list[Any]] = []
         self.materials: list[dict[str, Any]] = []
+        self.primvars: list[frozenset[str]] = []
+        """Per material: the names of the primvars that it may look up."""
 
     def bound(self, prims: list[Any]) -> list[int | None]:
-        """Return for each prim the index of its material: the binding's purpose first, then the all-purpose one.
+        """Return for each prim the index of its material, by the purposes in their order.
 
         All prims of a stage come at once: what a material says may depend on all of its geometry.
         """
         if not prims:
             return []
-        materials, relationships = UsdShade.MaterialBindingAPI.ComputeBoundMaterials(prims, self._purpose)
         result: list[int | None] = []
         found: list[Any] = []
-        for prim, material, relationship in zip(prims, materials, relationships, strict=True):
+        for prim, (material, relationship) in zip(prims, self._bindings(prims), strict=True):
             if material:
                 result.append(self._index(material.GetPrim(), prim, found))
                 continue
@@ -65,12 +70,32 @@ class MaterialReader:
                 )
             result.append(None)
         for prim, users in zip(found, self._users, strict=True):
-            self.materials.append(self._read(prim, users))
+            material, primvars = self._read(prim, users)
+            self.materials.append(material)
+            self.primvars.append(frozenset(primvars))
         return result
+
+    def _bindings(self, prims: list[Any]) -> list[tuple[Any, Any]]:
+        """Return for each prim its material, None if there is none, and the relationship that counts."""
+        bindings: list[tuple[Any, Any]] = [(None, None)] * len(prims)
+        open_places = list(range(len(prims)))
+        for purpose in self._purposes:
+            if not open_places:
+                break
+            # USD falls back on the all-purpose binding, whose turn may come later or never.
+            of_purpose = UsdShade.MaterialBindingAPI.ComputeBoundMaterials([prims[i] for i in open_places], purpose)
+            undecided = []
+            for i, material, relationship in zip(open_places, *of_purpose, strict=True):
+                if relationship and _binding_purpose(relationship) == purpose:
+                    bindings[i] = (material, relationship)
+                else:
+                    undecided.append(i)
+            open_places = undecided
+        return bindings
 
     def unbound(self, prim: Any) -> dict[str, Any]:
         """Return a Material prim as the description has it, without regard to what is bound to it."""
-        return self._read(prim, [])
+        return self._read(prim, [])[0]
 
     def _index(self, prim: Any, user: Any, found: list[Any]) -> int:
         key = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
@@ -82,8 +107,9 @@ class MaterialReader:
         self._users[index].append(user)
         return index
 
-    def _read(self, prim: Any, users: list[Any]) -> dict[str, Any]:
+    def _read(self, prim: Any, users: list[Any]) -> tuple[dict[str, Any], set[str]]:
         network = Network(self._time, self._diagnostics, cache(lambda name: _has_primvar(users, name)))
+        nodes = NodeReader(network, self._assets, self._diagnostics)
         interface, _ = self._inputs(network, prim, tokens.INPUTS_PREFIX + tokens.ABBE_PREFIX)
         material: dict[str, Any] = {
             "path": str(prim.GetPath()),
@@ -92,14 +118,17 @@ class MaterialReader:
         }
         self._check_names(material["path"], material["abbe"])
         self._check_names(material["path"], interface, tokens.INPUTS_PREFIX)
-        shaders = [self._shader(network, shader, name) for shader, name in self._surfaces(network, prim).items()]
+        surfaces = self._surfaces(network, prim)
+        shaders = [self._shader(network, nodes, shader, name) for shader, name in surfaces.items()]
         for shader in shaders:
             self._check_names(shader["path"], shader["abbe"], tokens.INPUTS_PREFIX)
         if shaders:
             material["surface"], *material["alternatives"] = shaders
         else:
             self._diagnostics.warn("material-without-surface", place(prim), "the material has no surface shader")
-        return material
+        if nodes.nodes:
+            material["nodes"] = nodes.nodes
+        return material, nodes.primvars
 
     def _check_names(self, path: str, names: Iterable[str], prefix: str = "") -> None:
         warn_unknown_names(path, names, tokens.MATERIAL_NAMES, self._diagnostics, prefix=prefix)
@@ -121,22 +150,24 @@ class MaterialReader:
                 )
         return shaders
 
-    def _shader(self, network: Network, prim: Any, terminal: str) -> dict[str, Any]:
-        inputs, connected = self._inputs(network, prim, tokens.INPUTS_PREFIX)
+    def _shader(self, network: Network, nodes: NodeReader, prim: Any, terminal: str) -> dict[str, Any]:
+        inputs, drivers = self._inputs(network, prim, tokens.INPUTS_PREFIX)
         ours = {name: value for name, value in inputs.items() if name.startswith(tokens.ABBE_PREFIX)}
+        outputs = {name: nodes.output(driver) for name, driver in drivers.items()}
         return {
             "path": str(prim.GetPath()),
             "id": _identifier(prim, terminal),
             "terminal": terminal,
             "inputs": {name: value for name, value in inputs.items() if name not in ours},
-            "connected": connected,
+            "connected": {name: driver.path for name, driver in drivers.items()},
+            "networks": {name: output for name, output in outputs.items() if output is not None},
             "abbe": ours,
         }
 
-    def _inputs(self, network: Network, prim: Any, prefix: str) -> tuple[dict[str, Any], dict[str, str]]:
+    def _inputs(self, network: Network, prim: Any, prefix: str) -> tuple[dict[str, Any], dict[str, Driver]]:
         """Return the constant inputs whose names begin with ``prefix``, and the outputs that drive the others."""
         constants: dict[str, Any] = {}
-        connected: dict[str, str] = {}
+        connected: dict[str, Driver] = {}
         for item in prim.GetAuthoredPropertiesInNamespace(prefix.rstrip(":")):
             if not isinstance(item, Usd.Attribute):
                 continue
@@ -145,12 +176,20 @@ class MaterialReader:
                 continue
             name = item.GetName()[len(tokens.INPUTS_PREFIX) :]
             if isinstance(value, Driver):
-                connected[name] = value.path
+                connected[name] = value
                 continue
             data = plain(value.data)
             if data is not None:
                 constants[name] = {"type": value.type, "value": data}
         return constants, connected
+
+
+def _binding_purpose(relationship: Any) -> str:
+    """Return the purpose of a binding: ``material:binding[:full]``, ``material:binding:collection[:full]:name``."""
+    parts = relationship.GetName().split(":")[2:]
+    if parts[:1] == [tokens.COLLECTION]:
+        return parts[1] if len(parts) > 2 else ""
+    return parts[0] if parts else ""
 
 
 def _has_primvar(prims: Iterable[Any], name: str) -> bool:

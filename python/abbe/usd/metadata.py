@@ -85,4 +85,6 @@ def stage_metadata(opened: OpenedStage, time_code: float | None, diagnostics: Di
         if rate is not None:
             result["frames_per_second"] = rate
             break
+    # As UsdStage has it, fallback included: what the shutter is in.
+    result["time_codes_per_second"] = float(stage.GetTimeCodesPerSecond())
     return result

@@ -9,7 +9,7 @@ has no value here, nor has one whose inputs are of other types than its definiti
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,8 @@ class Value:
     """Sdf type name."""
     data: Any
     """As USD has it, or numbers, strings and lists."""
+    attribute: Any = field(default=None, compare=False)
+    """The attribute that holds it; None for what a node computed."""
 
 
 Read = Callable[[str], Value | None]

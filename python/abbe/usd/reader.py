@@ -26,7 +26,9 @@ from .instancers import InstancerReader
 from .lenses import is_lens
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
+from .passes import Appearance, RenderPass, find_pass
 from .places import Places
+from .primvars import PrimvarReader
 from .render import find_settings, read_settings, token_list
 from .solids import solid_kind
 from .stage import OpenedStage, Opening, open_stage, source_name
@@ -102,6 +104,8 @@ class _State(NamedTuple):
     purpose: str | None
     instance: str | None
     """The outermost native instance."""
+    appearance: Appearance
+    """What a point instancer that is around makes of its prototypes."""
 
 
 class _Placed(NamedTuple):
@@ -135,10 +139,12 @@ class _Walk:
         opened: OpenedStage,
         time: Any,
         purposes: frozenset[str],
+        render_pass: RenderPass | None,
         level: int | None,
         diagnostics: Diagnostics,
     ) -> None:
         self.stage = opened.stage
+        self._pass = render_pass
         self.time = time
         self.purposes = purposes
         self.diagnostics = diagnostics
@@ -151,14 +157,16 @@ class _Walk:
         self._kinds: dict[str, _Kind] = {}
         self._facts_by_prim: dict[Any, _Facts] = {}
         self._hidden: dict[tuple[Any, str], bool] = {}
-        self._group_by_prototype: dict[tuple[Any, str | None], int] = {}
+        self._group_by_prototype: dict[tuple[Any, str | None, Appearance], int] = {}
         # The prototypes around what is visited, innermost last.
         self._open: list[Any] = []
 
     def run(self) -> None:
         """Visit every prim that the stage defines, those inside native instances included."""
         prims = iter(Usd.PrimRange(self.stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
-        self._traverse(prims, itertools.islice(prims, 1, None), _State(True, None, None), 0, self.groups[0])
+        self._traverse(
+            prims, itertools.islice(prims, 1, None), _State(True, None, None, Appearance()), 0, self.groups[0]
+        )
 
     def _traverse(self, prims: Any, visited: Any, state: _State, depth: int, group: _Group) -> None:
         """Visit the prims of a range; ``depth`` is that of the first one's parent, ``state`` what it inherits."""
@@ -178,6 +186,10 @@ class _Walk:
             # In a prototype, what stands above may be an `over`, but what is drawn is defined.
             undefined = group.root is not None and prim.GetSpecifier() == Sdf.SpecifierOver
             if kind is _Kind.LEAF or undefined:
+                prims.PruneChildren()
+                continue
+            if self._pass is not None and self._pass.prunes(path):
+                self.diagnostics.skip("pruned by the render pass")
                 prims.PruneChildren()
                 continue
             state = self._inherit(prim, facts, parent)
@@ -205,6 +217,9 @@ class _Walk:
         if not state.visible:
             self.diagnostics.skip("invisible")
             return
+        if not self._is_rendered(prim):
+            return
+        state = state._replace(appearance=self._appearance(prim, state))
 
         def has_something(root: Any) -> bool:
             index = self._prototype(root, prim, state)
@@ -231,7 +246,7 @@ class _Walk:
         stands does not hide its instances. Purpose is inherited where it stands, else from the instancer.
         """
         purpose = self._purpose_above(root) or state.purpose
-        key = (root, purpose)
+        key = (root, purpose, state.appearance)
         if root in self._open:
             self.diagnostics.warn(
                 "instancer", place(instancer), f"its prototype <{root.GetPath()}> contains it; it is left out there"
@@ -248,7 +263,7 @@ class _Walk:
             prims = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
             depth = root.GetPath().pathElementCount - 1
             try:
-                self._traverse(prims, prims, _State(True, purpose, None), depth, group)
+                self._traverse(prims, prims, _State(True, purpose, None, state.appearance), depth, group)
             finally:
                 self._open.pop()
         return index
@@ -291,13 +306,30 @@ class _Walk:
             parent.visible and not facts.invisible,
             parent.purpose if facts.purpose is None else facts.purpose,
             str(prim.GetPath()) if enters_instance else parent.instance,
+            parent.appearance,
         )
+
+    def _is_rendered(self, prim: Any) -> bool:
+        """Whether the render pass shows a prim; counted where not."""
+        if self._pass is None or self._pass.renders(prim.GetPath()):
+            return True
+        self.diagnostics.skip("not in the render pass")
+        return False
+
+    def _appearance(self, prim: Any, state: _State) -> Appearance:
+        """Return how cameras see a prim."""
+        if self._pass is None:
+            return state.appearance
+        own = self._pass.appearance(prim.GetPath())
+        return Appearance(own.hidden or state.appearance.hidden, own.matte or state.appearance.matte)
 
     def _visit(self, prim: Any, source: Any, path: str, kind: _Kind, state: _State, group: _Group) -> None:
         """Do with a prim what its kind asks for; ``source`` is what it shares with other instances, or itself."""
         if kind is _Kind.CAMERA:
             if group.root is None:
                 self.cameras.append(prim)
+            return
+        if not self._is_rendered(prim):
             return
         if kind is _Kind.LIGHT:
             self.diagnostics.skip("lights: not asked for")
@@ -377,6 +409,11 @@ class _Walk:
             item["instance"] = state.instance
         if self.shapes.double_sided[shape]:
             item["double_sided"] = True
+        appearance = self._appearance(prim, state)
+        if appearance.hidden:
+            item["hidden_from_camera"] = True
+        if appearance.matte:
+            item["matte"] = True
         group.placed.append(_Placed(prim, shape, item))
 
     def bind(self, materials: MaterialReader) -> list[dict[str, Any]]:
@@ -387,6 +424,7 @@ class _Walk:
             prims.append(placed.prim)
             prims.extend(placed.prim.GetChild(name) for name in self.shapes.subset_names[placed.shape])
         bound = iter(materials.bound(prims))
+        primvars = PrimvarReader(self.shapes, self.time, self.diagnostics)
         for placed in placements:
             material = next(bound)
             if material is not None:
@@ -394,6 +432,11 @@ class _Walk:
             names = self.shapes.subset_names[placed.shape]
             if names:
                 placed.item["subset_materials"] = [next(bound) for _ in names]
+            used = {material, *placed.item.get("subset_materials", ())}
+            looked_up = {name for index in used if index is not None for name in materials.primvars[index]}
+            if None in used:
+                looked_up.add(tokens.DISPLAY_COLOR)
+            primvars.add(placed.prim, placed.shape, looked_up, placed.item)
         groups: list[dict[str, Any]] = []
         for group in self.groups:
             groups.append({"path": group.path, "items": [placed.item for placed in group.placed]})
@@ -459,6 +502,7 @@ def read_stage(
     frame: float | str | None,
     camera: str | None,
     render_settings: str | None,
+    render_pass: str | None,
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
@@ -469,15 +513,27 @@ def read_stage(
     """Read a stage into a description; the arguments are those of :func:`abbe.usd.describe`."""
     if missing not in ("warn", "error"):
         raise UsageError(f"missing '{missing}': choose 'warn' or 'error'")
+    if render_pass and render_settings:
+        raise UsageError("render pass: it says which render settings it renders: give one of the two")
     refinement_level(complexity)  # before the stage is opened
     diagnostics = Diagnostics()
     source = source_name(stage_or_path)
     with quiet_usd(source, diagnostics):
         # A mask keeps the camera and the settings that were asked for by path.
-        also = [path for path in (camera, render_settings, product) if path and path.startswith("/")]
+        also = [path for path in (camera, render_settings, render_pass, product) if path and path.startswith("/")]
         opened = open_stage(stage_or_path, also=also, diagnostics=diagnostics, **opening)
         return _read(
-            opened, diagnostics, frame, camera, render_settings, product, purposes, missing, complexity, strict
+            opened,
+            diagnostics,
+            frame,
+            camera,
+            render_settings,
+            render_pass,
+            product,
+            purposes,
+            missing,
+            complexity,
+            strict,
         )
 
 
@@ -487,6 +543,7 @@ def _read(
     frame: float | str | None,
     camera: str | None,
     render_settings: str | None,
+    render_pass: str | None,
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
@@ -496,11 +553,15 @@ def _read(
     stage, source = opened.stage, opened.source
     time, time_code = stage_time(stage, frame)
     composition_warnings(opened, missing, diagnostics)
+    active_pass = find_pass(stage, render_pass, source, diagnostics) if render_pass else None
+    if active_pass is not None:
+        render_settings = active_pass.settings
     settings_prim = find_settings(stage, render_settings, source, diagnostics)
-    walk = _Walk(opened, time, _purposes(purposes, settings_prim), refinement_level(complexity), diagnostics)
+    shown = _purposes(purposes, settings_prim)
+    walk = _Walk(opened, time, shown, active_pass, refinement_level(complexity), diagnostics)
     walk.run()
     assets = AssetReader(stage, time)
-    materials = MaterialReader(time, diagnostics, _binding_purpose(settings_prim))
+    materials = MaterialReader(time, diagnostics, _binding_purposes(settings_prim), assets)
     groups = walk.bind(materials)
 
     cameras: list[dict[str, Any]] = []
@@ -572,12 +633,10 @@ def _purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[str]:
     return frozenset([tokens.DEFAULT, *wanted])
 
 
-def _binding_purpose(settings: Any) -> str:
-    """Return the material purpose: the first of the settings' that is not the all-purpose one."""
+def _binding_purposes(settings: Any) -> Sequence[str]:
+    """Return the material purposes in the order in which they count: the settings', else full and all-purpose."""
     authored = None if settings is None else token_list(settings, tokens.MATERIAL_BINDING_PURPOSES)
-    if authored is None:
-        return tokens.FULL_PURPOSE
-    return next(filter(None, authored), str(UsdShade.Tokens.allPurpose))
+    return tokens.BINDING_PURPOSES if authored is None else authored
 
 
 def default_camera(stage: Any, settings: Any, cameras: list[Any]) -> Any:

@@ -2,25 +2,26 @@
 
 ``UsdRenderComputeSpec`` (pxr/usd/usdRender/spec.cpp) has no Python binding, so its rules stand here: a product begins
 as a copy of the settings' base attributes, fallbacks included, and overrides them with what is authored on it;
-variables are taken once each, in order. Two differences: a resolution counts only if authored somewhere, and
-``instantaneousShutter`` (read from the wrong attribute upstream) is honoured.
+variables are taken once each, in order; of attributes in namespaces, connections beat values. Three differences: a
+resolution counts only if authored somewhere, ``instantaneousShutter`` (read from the wrong attribute upstream) is
+honoured, and a connection gives the value of what it leads to instead of its path.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..errors import StageError
+from ..frame_tokens import expand_frame_tokens
 from . import tokens
 from ._pxr import Sdf, Usd, UsdGeom, UsdRender
 from .description import Diagnostics
 from .materials import warn_unknown_names
-from .values import authored_namespace, place, plain, read
+from .values import authored, authored_namespace, place, plain, read
 
-__all__ = ["all_settings", "expand_frame_tokens", "find_settings", "read_settings", "token_list"]
+__all__ = ["all_settings", "find_settings", "read_settings", "token_list", "typed_prim"]
 
 
 def all_settings(stage: Any) -> list[Any]:
@@ -39,11 +40,11 @@ def find_settings(stage: Any, wanted: str | None, source: str, diagnostics: Diag
         The prim asked for (or named by the metadata) is not there or is something else.
     """
     if wanted:
-        return _typed(stage, wanted, UsdRender.Settings, tokens.RENDER_SETTINGS, source)
+        return typed_prim(stage, wanted, UsdRender.Settings, tokens.RENDER_SETTINGS, source)
     default = stage.GetMetadata(tokens.RENDER_SETTINGS_PRIM_PATH)
     if default:
         where = f"{source}.{tokens.RENDER_SETTINGS_PRIM_PATH}"
-        return _typed(stage, str(default), UsdRender.Settings, tokens.RENDER_SETTINGS, where)
+        return typed_prim(stage, str(default), UsdRender.Settings, tokens.RENDER_SETTINGS, where)
     found = all_settings(stage)
     if len(found) > 1 and diagnostics is not None:
         for prim in found:
@@ -72,7 +73,7 @@ def token_list(settings: Any, name: str) -> list[str] | None:
     return value
 
 
-def _typed(stage: Any, wanted: str, schema: Any, type_name: str, where: str) -> Any:
+def typed_prim(stage: Any, wanted: str, schema: Any, type_name: str, where: str) -> Any:
     """Return the prim at ``wanted`` if it is of ``schema``, else raise with what there is."""
     prim = None
     if Sdf.Path.IsValidPathString(wanted):
@@ -130,7 +131,7 @@ def _wanted_product(stage: Any, products: list[tuple[int, Any]], wanted: str, so
         if wanted in (str(prim.GetPath()), prim.GetName()):
             return ordinal, prim
     if wanted.startswith("/") or not products:
-        return 0, _typed(stage, wanted, UsdRender.Product, tokens.RENDER_PRODUCT, source)
+        return 0, typed_prim(stage, wanted, UsdRender.Product, tokens.RENDER_PRODUCT, source)
     there = ", ".join(str(prim.GetPath()) for _, prim in products)
     raise StageError(f"{source}: the render settings have no product '{wanted}': choose one of {there}")
 
@@ -150,6 +151,10 @@ _FALLBACKS: dict[str, Any] = {
     "driver": {},
     "vars": [],
 }
+
+
+# From two samples on a value changes with time.
+_VARYING = 2
 
 
 class _Reader:
@@ -212,8 +217,10 @@ class _Reader:
         return product
 
     def _product_name(self, prim: Any, ordinal: int) -> str:
-        authored = read(prim, tokens.PRODUCT_NAME, self._time)
-        name = expand_frame_tokens(str(authored or ""), self._frame, prim.GetName(), ordinal)
+        name = str(read(prim, tokens.PRODUCT_NAME, self._time) or "")
+        # Samples give each frame its name, as it is to be.
+        if prim.GetAttribute(tokens.PRODUCT_NAME).GetNumTimeSamples() < _VARYING:
+            name = expand_frame_tokens(name, self._frame, prim.GetName(), ordinal)
         if name in tokens.VIEWER_PRODUCT_NAMES:
             self._diagnostics.warn(
                 "unusable-product-name",
@@ -237,12 +244,41 @@ class _Reader:
     def _driver(self, prim: Any, namespaces: tuple[str, ...]) -> dict[str, Any]:
         found: dict[str, Any] = {}
         for namespace in namespaces:
-            found.update(authored_namespace(prim, namespace, self._time, strip=True))
+            found.update(self._namespace(prim, namespace, strip=True))
         return found
+
+    def _namespace(self, prim: Any, namespace: str, strip: bool = False) -> dict[str, Any]:
+        """Return what is authored in a namespace; a connection counts before a value, and gives what it leads to."""
+        found = authored_namespace(prim, namespace, self._time, strip=strip)
+        for item in prim.GetAuthoredPropertiesInNamespace(namespace):
+            if not isinstance(item, Usd.Attribute) or not item.HasAuthoredConnections():
+                continue
+            name = item.GetName()[len(namespace) + 1 :] if strip else item.GetName()
+            value = self._connected(item)
+            if value is not None:
+                found[name] = value
+        return found
+
+    def _connected(self, attribute: Any) -> dict[str, Any] | None:
+        """Return the value at the end of an attribute's connections; None, with a warning, where there is none."""
+        seen = set()
+        end = attribute
+        while end and end.HasAuthoredConnections() and end.GetPath() not in seen:
+            seen.add(end.GetPath())
+            paths = end.GetConnections()
+            end = self._stage.GetAttributeAtPath(paths[0]) if paths else None
+        value = authored(end, self._time) if end and end.GetPath() not in seen else None
+        if value is None:
+            self._diagnostics.warn(
+                "unresolved-connection",
+                place(attribute),
+                "its connection leads to no value; its own counts, if it has one",
+            )
+        return value
 
     def ours(self, prim: Any, known: Mapping[str, str]) -> dict[str, Any]:
         """Return the authored ``abbe:`` attributes; unknown ones are warned of."""
-        found = authored_namespace(prim, tokens.ABBE, self._time)
+        found = self._namespace(prim, tokens.ABBE)
         warn_unknown_names(str(prim.GetPath()), found, known, self._diagnostics)
         return found
 
@@ -286,44 +322,3 @@ class _Reader:
         ):
             raise StageError(f"{place(prim)}.{name} = {value}: is not {count} finite number(s): correct the value")
         return [kind(number) for number in numbers]
-
-
-_TOKEN = re.compile(
-    r"""
-      <(?P<angle>FF|F|N|OS)(?P<angle_width>\d*)>          # RenderMan, Arnold: <F4>, <FF>, <N>, <OS>
-    | \$\{(?P<brace>FF|F)(?P<brace_width>\d*)\}           # ${F4}
-    | \$(?P<dollar>FF|F)(?:(?P<dollar_width>\d+)|(?![A-Za-z])) # Houdini, Arnold: $F4, $FF
-    | %(?P<zero>0?)(?P<percent_width>\d*)(?P<percent>[dg]) # C: %04d, %g
-    | (?P<hashes>\#+)(?P<fraction>\.\#+)?                  # usdrecord: ####, ###.##
-    """,
-    re.VERBOSE,
-)
-
-
-def expand_frame_tokens(name: str, frame: float, product: str = "", ordinal: int = 0) -> str:
-    """Return ``name`` with frame tokens replaced.
-
-    Understood are those of usdrecord (``####``, ``###.##``), RenderMan (``<F4>``, ``<N>`` the product's ordinal,
-    ``<OS>`` its prim name), Houdini and Arnold (``$F4``, ``${F4}``, ``$FF``) and C (``%04d``, ``%g``). Those with a
-    fraction (``FF``, ``%g``, ``#.#``) write it; the others write the frame's whole part.
-    """
-    whole = math.floor(frame)
-    exact = str(whole) if frame == whole else repr(frame)
-
-    def replace(match: re.Match[str]) -> str:
-        kind = match["angle"] or match["brace"] or match["dollar"]
-        width = match["angle_width"] or match["brace_width"] or match["dollar_width"] or match["percent_width"]
-        if kind == "N":
-            return f"{ordinal:0{int(width or 0)}d}"
-        if kind == "OS":
-            return product
-        if kind == "FF" or match["percent"] == "g":
-            return exact.zfill(int(width or 0)) if kind or match["zero"] else exact.rjust(int(width or 0))
-        if match["hashes"]:
-            digits = len(match["fraction"] or ".") - 1
-            return f"{frame:0{len(match[0])}.{digits}f}" if digits else f"{whole:0{len(match[0])}d}"
-        if match["percent"] and not match["zero"]:
-            return f"{whole:{int(width or 0)}d}"
-        return f"{whole:0{int(width or 0)}d}"
-
-    return _TOKEN.sub(replace, name)

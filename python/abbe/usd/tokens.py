@@ -100,10 +100,17 @@ INDICES: Final = "indices"
 
 # Materials.
 MATERIAL_BINDING: Final = "material:binding"
-FULL_PURPOSE: Final = "full"
+COLLECTION: Final = "collection"
+# The all-purpose binding has no name.
+BINDING_PURPOSES: Final = ("full", "")
 OUTPUTS_PREFIX: Final = "outputs:"
 INPUTS: Final = "inputs"
 INPUTS_PREFIX: Final = "inputs:"
+# Nodes that read texture coordinates by their number, and the color of the geometry.
+TEXTURE_COORDINATE_NODES: Final = "ND_texcoord_"
+GEOMETRY_COLOR_NODES: Final = "ND_geomcolor_"
+ST: Final = "st"
+DISPLAY_COLOR: Final = "displayColor"
 # Where in the name of an image the number of its tile stands.
 TILE_PATTERNS: Final = ("<UDIM>",)
 INFO: Final = "info"
@@ -167,6 +174,14 @@ PRIMVAR_READER_TYPES: Final = {
 # Cameras.
 PERSPECTIVE: Final = "perspective"
 CAMERA: Final = "camera"
+# By name, because 24.8 has only the first: what the description calls each.
+EXPOSURE: Final = {
+    "exposure": "stops",
+    "exposure:time": "time",
+    "exposure:iso": "iso",
+    "exposure:fStop": "f_stop",
+    "exposure:responsivity": "responsivity",
+}
 
 # Render settings.
 RENDER_SETTINGS: Final = "RenderSettings"
@@ -193,6 +208,15 @@ COLOR3F: Final = "color3f"
 SOURCE_NAME: Final = "sourceName"
 SOURCE_TYPE: Final = "sourceType"
 RAW: Final = "raw"
+RENDER_PASS: Final = "RenderPass"
+RENDER_SOURCE: Final = "renderSource"
+INPUT_PASSES: Final = "inputPasses"
+COMMAND: Final = "command"
+FILE_NAME: Final = "fileName"
+PRUNE: Final = "prune"
+RENDER_VISIBILITY: Final = "renderVisibility"
+CAMERA_VISIBILITY: Final = "cameraVisibility"
+MATTE: Final = "matte"
 # Later ones win, so that RenderMan's spelling yields to the common one.
 DRIVER_NAMESPACES: Final = ("ri:driver:parameters", "driver:parameters")
 AOV_DRIVER_NAMESPACES: Final = ("ri:driver:parameters:aov", "driver:parameters:aov")

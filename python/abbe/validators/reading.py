@@ -17,6 +17,7 @@ from .. import _core
 from ..errors import AbbeError, StageError
 from ..usd import describe, tokens
 from ..usd._pxr import Sdf, Usd, UsdShade
+from ..usd.assets import AssetReader
 from ..usd.composition import quiet_usd
 from ..usd.description import Array, Description, Diagnostics
 from ..usd.materials import MaterialReader
@@ -103,6 +104,7 @@ class Reading:
         self._options: dict[str, Any] = {"frame": frame, "purposes": purposes, "missing": missing}
         self._metadata = stage_metadata(opened, self._time_code, Diagnostics())
         self._kept: dict[str, Any] = {}
+        self._textures: list[dict[str, Any]] = []
 
     def once(self, name: str, find: Callable[[], Any]) -> Any:
         """Return what ``find`` returns, called for the first who asks under this name."""
@@ -138,11 +140,17 @@ class Reading:
         described = self.described
         documents = {} if isinstance(described, StageError) else {m["path"]: m for m in described.document["materials"]}
         seen = {shared_source(self.stage.GetPrimAtPath(path)) for path in documents}
-        reader = MaterialReader(self.time, Diagnostics(), tokens.FULL_PURPOSE)
+        assets = AssetReader(self.stage, self.time)
+        if not isinstance(described, StageError):
+            # Their materials refer to them by index.
+            assets.textures.extend(described.document["textures"])
+        reader = MaterialReader(self.time, Diagnostics(), tokens.BINDING_PURPOSES, assets)
         for prim in self.prims:
             if prim.IsA(UsdShade.Material) and shared_source(prim) not in seen:
                 seen.add(shared_source(prim))
                 documents[str(prim.GetPath())] = reader.unbound(prim)
+        # Nothing is looked up: what is in the files does not matter.
+        self._textures = [{"place": t["place"], "asset": {"path": t["asset"]["path"]}} for t in assets.textures]
         return {path: self._compile(document) for path, document in documents.items()}
 
     @cached_property
@@ -246,6 +254,7 @@ class Reading:
             "groups": [{"path": "/", "items": [item if material is None else {**item, "material": 0}]}],
             "root": 0,
             "materials": [] if material is None else [material],
+            "textures": self._textures,
             "cameras": [_CAMERA],
             "settings": settings or {},
         }

@@ -19,6 +19,7 @@ What is not given, the scene's render settings decide.
   --product PATH           the one product to render
   --width N, --height N    pixels; one alone keeps the aspect
   --samples N              samples per pixel
+  --depth-of-field on|off  spread samples over the lens, or not; as the scene says unless given
   --integrator NAME        what computes a pixel
   --aov NAME               an AOV to render, instead of the scene's; repeat for more
   --wavelength NM          reference wavelength
@@ -26,6 +27,7 @@ What is not given, the scene's render settings decide.
   --dispersion-scale S     multiplies all dispersion: 0 none, 1 physical
   --seed N                 same seed, same bits
   --threads N              all of the machine's unless given; never changes a bit
+  --texture-memory MB      for the texels of images, 4294 unless given; never changes a bit
   --crop X0,Y0,X1,Y1       pixels to render, half-open, y down
   --sample-range A:B       samples to render, half-open; `abbe merge` joins parts
   --strict                 any warning is an error, and nothing is written
@@ -82,12 +84,20 @@ fn read(mut parser: lexopt::Parser) -> Result<Command> {
             "width" => request.width = Some(number(&mut parser, &option)?),
             "height" => request.height = Some(number(&mut parser, &option)?),
             "samples" => request.samples = Some(number(&mut parser, &option)?),
+            "depth-of-field" => {
+                request.depth_of_field = Some(match text(&mut parser, &option)?.as_str() {
+                    "on" => true,
+                    "off" => false,
+                    other => return Err(Error::usage("--depth-of-field", format!("'{other}' is neither on nor off"))),
+                });
+            }
             "integrator" => request.integrator = Some(text(&mut parser, &option)?),
             "aov" => request.aovs.get_or_insert_default().push(text(&mut parser, &option)?),
             "wavelength" => request.wavelength = Some(number(&mut parser, &option)?),
             "band" => request.band = Some(numbers(&mut parser, &option, ':', "LO:HI")?),
             "dispersion-scale" => request.dispersion_scale = Some(number(&mut parser, &option)?),
             "seed" => request.seed = Some(number(&mut parser, &option)?),
+            "texture-memory" => request.texture_memory = Some(number(&mut parser, &option)?),
             "threads" => request.threads = Some(number(&mut parser, &option)?),
             "crop" => request.crop = Some(numbers(&mut parser, &option, ',', "X0,Y0,X1,Y1")?),
             "sample-range" => request.sample_range = Some(numbers(&mut parser, &option, ':', "A:B")?),

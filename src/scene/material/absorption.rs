@@ -54,7 +54,7 @@ fn of_table(stated: &StatedAbsorption, context: &Context) -> Result<(Absorption,
 mod tests {
     use serde_json::{Value, json};
 
-    use super::super::{Kind, Material, ScalarIor, compile};
+    use super::super::{Kind, Material, ScalarIor, compile_alone};
     use super::*;
     use crate::spectrum::{REFERENCE, lines};
 
@@ -77,7 +77,7 @@ mod tests {
         let material = serde_json::from_value(material).expect("the test's document follows the schema");
         let mut diagnostics = Diagnostics::default();
         let context = Context { scalar_ior: ScalarIor::Constant, meters_per_unit };
-        compile(&material, &context, &mut diagnostics).map(|material| (material, diagnostics))
+        compile_alone(&material, &context, &mut diagnostics).map(|material| (material, diagnostics))
     }
 
     fn color(rgb: [f64; 3], depth: f64) -> Value {

@@ -46,7 +46,7 @@ fn token(value: &str) -> serde_json::Value {
 
 fn compiled(material: &description::Material) -> (Material, Diagnostics) {
     let mut diagnostics = Diagnostics::default();
-    let material = compile(material, &CONTEXT, &mut diagnostics).expect("compiles");
+    let material = compile_alone(material, &CONTEXT, &mut diagnostics).expect("compiles");
     (material, diagnostics)
 }
 
@@ -64,7 +64,7 @@ fn law(material: &description::Material) -> Dispersion {
 }
 
 fn refused(material: &description::Material) -> String {
-    compile(material, &CONTEXT, &mut Diagnostics::default()).expect_err("is refused").to_string()
+    compile_alone(material, &CONTEXT, &mut Diagnostics::default()).expect_err("is refused").to_string()
 }
 
 /// Differences of a few units in the last place of numbers near 1.
@@ -380,7 +380,7 @@ fn nearest_glass_gives_a_lone_index_the_curve_of_the_catalogue() {
     let with_ior = |ior: f64, abbe_number: f64| {
         let inputs = json!({"transmission": float(1.0), "specular_IOR": float(ior), "transmission_dispersion": float(abbe_number)});
         let mut diagnostics = Diagnostics::default();
-        let glass = compile(&shaded("ND_standard_surface_surfaceshader", inputs), &nearest, &mut diagnostics);
+        let glass = compile_alone(&shaded("ND_standard_surface_surfaceshader", inputs), &nearest, &mut diagnostics);
         (glass.expect("compiles"), diagnostics)
     };
     let curve = |glass: &Material| match &glass.kind {
@@ -407,7 +407,7 @@ fn nearest_glass_gives_a_lone_index_the_curve_of_the_catalogue() {
         "abbe:dispersion:vd".to_owned(),
         description::Authored { type_name: "double".to_owned(), value: json!(0.0) },
     );
-    let glass = compile(&constant, &nearest, &mut Diagnostics::default()).expect("compiles");
+    let glass = compile_alone(&constant, &nearest, &mut Diagnostics::default()).expect("compiles");
     assert!(curve(&glass).is_constant());
 }
 

@@ -6,6 +6,7 @@
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
+use super::super::appearance::{Below, OpacityInput};
 use super::super::{Context, THRESHOLD};
 use super::Dialect;
 #[cfg(test)]
@@ -51,13 +52,9 @@ impl Dialect for GltfPbr {
     }
 
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
-        // In the mode OPAQUE alpha is ignored.
-        let limit = match inputs.word(ALPHA_MODE, &["OPAQUE", "MASK", "BLEND"])? {
-            "MASK" => Some(inputs.number(ALPHA_CUTOFF, diagnostics)?),
-            "BLEND" => Some(THRESHOLD),
-            _ => None,
-        };
-        if let Some(limit) = limit {
+        if let Some(limit) = limit(inputs, diagnostics)?
+            && !inputs.is_looked_up(ALPHA.name)
+        {
             let alpha = inputs.weight(ALPHA, diagnostics)?;
             if alpha.value < limit {
                 return Ok(Response::CutOut(alpha.to_string()));
@@ -87,6 +84,13 @@ impl Dialect for GltfPbr {
         Ok(response)
     }
 
+    fn opacity(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Option<OpacityInput>> {
+        let limit = if inputs.is_looked_up(ALPHA.name) { limit(inputs, diagnostics)? } else { None };
+        let cut_out =
+            |limit| OpacityInput { name: ALPHA.name, limit: limit as f32, below: Below::CutOut, is_color: false };
+        Ok(limit.map(cut_out))
+    }
+
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {
         let dispersion = inputs.number(DISPERSION, diagnostics)?;
         if dispersion < 0.0 {
@@ -113,4 +117,13 @@ impl Dialect for GltfPbr {
             Some(_) => inputs.refuse(DISTANCE, "author a positive distance, or nothing for no absorption"),
         }
     }
+}
+
+/// The alpha below which the surface is not there; in the mode OPAQUE alpha is ignored.
+fn limit(inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Option<f64>> {
+    Ok(match inputs.word(ALPHA_MODE, &["OPAQUE", "MASK", "BLEND"])? {
+        "MASK" => Some(inputs.number(ALPHA_CUTOFF, diagnostics)?),
+        "BLEND" => Some(THRESHOLD),
+        _ => None,
+    })
 }

@@ -1,5 +1,6 @@
 //! Inputs of a shader, each read with its definition's default.
 
+use std::collections::BTreeSet;
 use std::fmt::Display;
 
 use crate::diagnostics::Diagnostics;
@@ -57,15 +58,28 @@ impl Display for Weight {
 pub(super) struct Inputs<'a> {
     shader: &'a Shader,
     values: Values<'a>,
+    /// Driven inputs that are looked up where a ray meets the surface.
+    looked_up: BTreeSet<String>,
 }
 
 impl<'a> Inputs<'a> {
     pub(super) fn new(shader: &'a Shader) -> Self {
-        Self { shader, values: Values::new(&shader.inputs, &shader.path, "inputs:") }
+        let values = Values::new(&shader.inputs, &shader.path, "inputs:");
+        Self { shader, values, looked_up: BTreeSet::new() }
     }
 
     pub(super) fn shader(&self) -> &'a Shader {
         self.shader
+    }
+
+    /// Says which driven inputs can be looked up.
+    pub(super) fn look_up(&mut self, can: impl Fn(&str) -> bool) {
+        self.looked_up = self.shader.connected.keys().filter(|name| can(name)).cloned().collect();
+    }
+
+    /// Whether the input differs from point to point, and is looked up there.
+    pub(super) fn is_looked_up(&self, name: &str) -> bool {
+        self.looked_up.contains(name)
     }
 
     /// `</World/Glass/Shader>.inputs:ior`
@@ -120,6 +134,9 @@ impl<'a> Inputs<'a> {
 
     /// Why the surface is not there, if its opacity says so.
     pub(super) fn cut_out(&self, input: Number, diagnostics: &mut Diagnostics) -> Result<Option<String>> {
+        if self.is_looked_up(input.name) {
+            return Ok(None);
+        }
         let presence = self.weight(input, diagnostics)?;
         Ok((presence.value < THRESHOLD).then(|| presence.to_string()))
     }

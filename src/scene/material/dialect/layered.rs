@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::optics::media::Priority;
 
 use super::super::THRESHOLD;
+use super::super::appearance::{Below, OpacityInput};
 use super::inputs::{Color, Inputs, Integer, Number, Weight};
 use super::vocabulary::{Attenuation, Glass, Response};
 
@@ -43,6 +44,12 @@ pub(super) fn layered(
         return Ok(Response::Metal { why: metalness.to_string(), rough: metal_is_rough(diagnostics)? });
     }
     Ok(Response::Opaque(transmission.to_string()))
+}
+
+/// Holes where an opacity that is looked up is below one half.
+pub(super) fn holes(inputs: &Inputs<'_>, input: Number, is_color: bool) -> Option<OpacityInput> {
+    let limit = THRESHOLD as f32;
+    inputs.is_looked_up(input.name).then_some(OpacityInput { name: input.name, limit, below: Below::CutOut, is_color })
 }
 
 /// The index of refraction, positive.

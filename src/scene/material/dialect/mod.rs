@@ -31,6 +31,7 @@ use crate::optics::media::Priority;
 use crate::scene::description::Shader;
 
 use super::Context;
+use super::appearance::OpacityInput;
 #[cfg(test)]
 use inputs::Declared;
 use inputs::Inputs;
@@ -50,6 +51,11 @@ trait Dialect: Sync {
 
     /// The index and dispersion of a transmissive surface.
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass>;
+
+    /// The input that says where the surface is there, if that is looked up from point to point.
+    fn opacity(&self, _: &Inputs<'_>, _: &mut Diagnostics) -> Result<Option<OpacityInput>> {
+        Ok(None)
+    }
 
     /// How the inside absorbs; `None` where it does not, or where the model colours the surface alone.
     fn attenuation(&self, _: &Inputs<'_>, _: &Context, _: &mut Diagnostics) -> Result<Option<Attenuation>> {
@@ -91,6 +97,16 @@ impl<'a> Surface<'a> {
     pub(super) fn of(shader: &'a Shader) -> Option<Self> {
         let dialect = DIALECTS.iter().find(|dialect| dialect.ids().contains(&shader.id.as_str()))?;
         Some(Self { dialect: *dialect, inputs: Inputs::new(shader) })
+    }
+
+    /// Says which driven inputs can be looked up where a ray meets the surface.
+    pub(super) fn look_up(&mut self, can: impl Fn(&str) -> bool) {
+        self.inputs.look_up(can);
+    }
+
+    /// The input that says where the surface is there, if that is looked up from point to point.
+    pub(super) fn opacity(&self, diagnostics: &mut Diagnostics) -> Result<Option<OpacityInput>> {
+        self.dialect.opacity(&self.inputs, diagnostics)
     }
 
     /// The shader itself.

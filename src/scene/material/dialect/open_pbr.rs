@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::optics::media::Priority;
 
 use super::super::Context;
+use super::super::appearance::OpacityInput;
 use super::Dialect;
 #[cfg(test)]
 use super::inputs::Declared;
@@ -73,6 +74,10 @@ impl Dialect for OpenPbr {
             |diagnostics| inputs.is_rough(ROUGHNESS, diagnostics),
             diagnostics,
         )
+    }
+
+    fn opacity(&self, inputs: &Inputs<'_>, _: &mut Diagnostics) -> Result<Option<OpacityInput>> {
+        Ok(layered::holes(inputs, OPACITY, false))
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {

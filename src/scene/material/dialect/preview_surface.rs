@@ -7,6 +7,7 @@ use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
 use super::super::THRESHOLD;
+use super::super::appearance::{Below, OpacityInput};
 #[cfg(test)]
 use super::inputs::Declared;
 use super::inputs::{Inputs, Number, Switch, Word, input};
@@ -43,7 +44,13 @@ impl Dialect for PreviewSurface {
 
     /// Opacity under 0.5 is glass in the mode `transparent`, and a hole in the mode `presence` or under a threshold.
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
-        let opacity = inputs.number(OPACITY, diagnostics)?;
+        let looked_up = self.opacity(inputs, diagnostics)?;
+        if looked_up.is_some_and(|opacity| opacity.below == Below::Glass) {
+            let rough = inputs.is_rough(ROUGHNESS, diagnostics)?;
+            let why = "opacity is looked up: glass below 0.5, opaque elsewhere".to_owned();
+            return Ok(Response::Transmissive { why, rough, thin_walled: false });
+        }
+        let opacity = if looked_up.is_some() { OPACITY.default } else { inputs.number(OPACITY, diagnostics)? };
         let threshold = inputs.number(OPACITY_THRESHOLD, diagnostics)?;
         let is_presence = inputs.word(OPACITY_MODE, &["transparent", "presence"])? == "presence";
         // With a threshold, what is under it is not rendered and everything else is fully opaque.
@@ -64,6 +71,17 @@ impl Dialect for PreviewSurface {
         }
         let masked = if threshold > 0.0 { format!(", not under opacityThreshold {threshold}") } else { String::new() };
         Ok(Response::Opaque(format!("opacity {opacity}{masked}")))
+    }
+
+    fn opacity(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Option<OpacityInput>> {
+        if !inputs.is_looked_up(OPACITY.name) {
+            return Ok(None);
+        }
+        let threshold = inputs.number(OPACITY_THRESHOLD, diagnostics)?;
+        let is_presence = inputs.word(OPACITY_MODE, &["transparent", "presence"])? == "presence";
+        let limit = if threshold > 0.0 { threshold } else { THRESHOLD } as f32;
+        let below = if threshold > 0.0 || is_presence { Below::CutOut } else { Below::Glass };
+        Ok(Some(OpacityInput { name: OPACITY.name, limit, below, is_color: false }))
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {

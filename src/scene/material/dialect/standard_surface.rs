@@ -8,6 +8,7 @@ use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 use crate::optics::media::Priority;
 
+use super::super::appearance::OpacityInput;
 use super::super::{Context, SMOOTH_ROUGHNESS};
 use super::Dialect;
 #[cfg(test)]
@@ -69,6 +70,10 @@ impl Dialect for StandardSurface {
             |diagnostics| inputs.is_rough(ROUGHNESS, diagnostics),
             diagnostics,
         )
+    }
+
+    fn opacity(&self, inputs: &Inputs<'_>, _: &mut Diagnostics) -> Result<Option<OpacityInput>> {
+        Ok(layered::holes(inputs, OPACITY, true))
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::super::{Context, Kind, Material, ScalarIor, compile};
+use super::super::{Context, Kind, Material, ScalarIor, compile_alone};
 use super::absorption::StatedAbsorption;
 use super::*;
 use crate::optics::Extinction;
@@ -29,7 +29,7 @@ fn glass(abbe: &Value) -> description::Material {
 fn compiled(abbe: &Value) -> Result<(Material, Diagnostics)> {
     let mut diagnostics = Diagnostics::default();
     let context = Context { scalar_ior: ScalarIor::Constant, meters_per_unit: 0.01 };
-    let material = compile(&glass(abbe), &context, &mut diagnostics)?;
+    let material = compile_alone(&glass(abbe), &context, &mut diagnostics)?;
     Ok((material, diagnostics))
 }
 

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::super::{Kind, Material, ScalarIor, compile};
+use super::super::{Kind, Material, ScalarIor, compile_alone};
 use super::*;
 use crate::diagnostics::Diagnostics;
 use crate::scene::description;
@@ -33,7 +33,7 @@ fn material(id: &str, values: &Value) -> description::Material {
 
 fn compiled(id: &str, values: &Value) -> (Material, Diagnostics) {
     let mut diagnostics = Diagnostics::default();
-    let material = compile(&material(id, values), &CENTIMETERS, &mut diagnostics)
+    let material = compile_alone(&material(id, values), &CENTIMETERS, &mut diagnostics)
         .unwrap_or_else(|error| panic!("{id} {values}: {error}"));
     (material, diagnostics)
 }

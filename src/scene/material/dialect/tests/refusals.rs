@@ -48,7 +48,7 @@ fn with(base: &Value, name: &str, value: Value) -> Value {
 fn refused(ids: &[&str], name: &str, value: &Value) -> Option<String> {
     ids.iter().flat_map(|id| bases(id).into_iter().map(move |base| (id, base))).find_map(|(id, base)| {
         let material = material(id, &with(&base, name, value.clone()));
-        compile(&material, &CENTIMETERS, &mut Diagnostics::default()).err().map(|error| error.to_string())
+        compile_alone(&material, &CENTIMETERS, &mut Diagnostics::default()).err().map(|error| error.to_string())
     })
 }
 

@@ -1,0 +1,224 @@
+//! The layers of a product: which AOV, under what name, stored in how many bits.
+//!
+//! Names and types are those of the RenderVars (`driver:parameters:aov:name`, `channel_prefix`, `format`, else the prim's
+//! name and `dataType`); what a variable asks for and nobody can give is named in a warning.
+
+use serde::Serialize;
+
+use super::request::Request;
+use super::settings::Attributes;
+use crate::diagnostics::Diagnostics;
+use crate::error::{Error, Result};
+use crate::film::aov::{self, Aov, SampleType};
+use crate::integrator::Registry;
+use crate::scene::description::{Product, Var};
+
+/// What `differentials` writes when nobody says what to write.
+const DEFAULT_AOVS: &[&str] = &[
+    "dispersion",
+    "dispersion_footprint",
+    "ddirection_dlambda",
+    "dposition_dlambda",
+    "ior",
+    "interfaces",
+    "depth",
+    "normal",
+    "position",
+    "refracted_position",
+    "prim_id",
+    "material_id",
+];
+
+/// The name of the beauty, whose channels stand bare.
+const BEAUTY: &str = "color";
+
+/// Parameters of a RenderVar's driver that are understood, with those that have no meaning here by their usual value.
+const VAR_PARAMETERS: &[&str] = &["name", "format", "channel_prefix", "clearValue", "multiSampled"];
+
+/// One layer to be rendered.
+#[derive(Clone, Debug, Serialize)]
+pub struct PlannedLayer {
+    /// Its AOV.
+    #[serde(serialize_with = "aov_name")]
+    pub aov: &'static Aov,
+    /// EXR layer name; empty for bare channels.
+    pub name: String,
+    /// Stored in 16 bits.
+    pub half: bool,
+}
+
+fn aov_name<S: serde::Serializer>(aov: &&'static Aov, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(aov.name)
+}
+
+impl PlannedLayer {
+    fn plain(aov: &'static Aov) -> Self {
+        Self { aov, name: layer_name(aov.name, aov.name, ""), half: false }
+    }
+}
+
+/// `prefix` and `name`; the beauty under one of its own names has bare channels.
+fn layer_name(aov: &str, name: &str, prefix: &str) -> String {
+    if aov == BEAUTY && prefix.is_empty() && aov::canonical_name(name) == BEAUTY {
+        return String::new();
+    }
+    format!("{prefix}{name}")
+}
+
+/// The integrator and the layers of `product`.
+pub(super) fn layers(
+    request: &Request,
+    attributes: &Attributes<'_>,
+    product: Option<&Product>,
+    registry: &Registry,
+    diagnostics: &mut Diagnostics,
+) -> Result<(String, Vec<PlannedLayer>)> {
+    let chosen = match &request.integrator {
+        Some(name) => name.clone(),
+        None => attributes.text("abbe:integrator")?.filter(|name| !name.is_empty()).unwrap_or("differentials".into()),
+    };
+    let integrator = registry.find(&chosen)?;
+    let offered = integrator.aovs();
+    let find = |name: &str| {
+        let canonical = aov::canonical_name(name);
+        offered.iter().copied().find(|aov| aov.name == canonical)
+    };
+    let unavailable = |name: &str| match aov::find(name) {
+        Some(_) => format!("the integrator '{chosen}' has no '{name}'"),
+        None if aov::canonical_name(name) == BEAUTY => format!("the integrator '{chosen}' has no '{name}'"),
+        None => format!("the integrator '{chosen}' has no AOV '{name}'; `abbe aovs` lists what there is"),
+    };
+    let mut layers: Vec<PlannedLayer> = Vec::new();
+    if let Some(names) = &request.aovs {
+        for name in names {
+            let aov = find(name).ok_or_else(|| Error::usage(format!("--aov {name}"), unavailable(name)))?;
+            if layers.iter().all(|layer| layer.aov.name != aov.name) {
+                layers.push(PlannedLayer::plain(aov));
+            }
+        }
+        if layers.is_empty() {
+            return Err(Error::usage("--aov", "no AOV is asked for: name one, or leave the option out"));
+        }
+        return Ok((chosen, layers));
+    }
+    for var in product.map_or(&[][..], |p| &p.vars) {
+        let source = match source(var) {
+            Ok(source) => source,
+            Err(problem) => {
+                diagnostics.warn("unavailable-render-var", &var.path, format!("{problem}: it is left out"));
+                continue;
+            }
+        };
+        let Some(aov) = find(source) else {
+            diagnostics.warn("unavailable-render-var", &var.path, format!("{}: it is left out", unavailable(source)));
+            continue;
+        };
+        let name = match text(var, "name") {
+            "" => var.name.as_str(),
+            name => name,
+        };
+        let name = layer_name(aov.name, name, text(var, "channel_prefix"));
+        warn_of_parameters(var, aov, diagnostics);
+        let half = is_half(var, aov, diagnostics);
+        if let Some(other) = layers.iter().find(|layer| layer.name == name) {
+            return Err(Error::scene(
+                &var.path,
+                format!(
+                    "its layer '{name}' is also that of '{}': give it another driver:parameters:aov:name",
+                    other.aov.name
+                ),
+            ));
+        }
+        layers.push(PlannedLayer { aov, name, half });
+    }
+    if layers.is_empty() {
+        layers = DEFAULT_AOVS.iter().filter_map(|name| find(name)).map(PlannedLayer::plain).collect();
+        if layers.is_empty() {
+            layers = offered.into_iter().map(PlannedLayer::plain).collect();
+        }
+    }
+    Ok((chosen, layers))
+}
+
+fn text<'a>(var: &'a Var, name: &str) -> &'a str {
+    var.driver.get(name).and_then(|a| a.value.as_str()).unwrap_or("")
+}
+
+/// The AOV that a variable names, or why it names none. Hydra's prefixes say what `sourceType` says too.
+fn source(var: &Var) -> Result<&str, String> {
+    let name = if var.source_name.is_empty() { &var.name } else { &var.source_name };
+    let (kind, name) = match name.split_once(':') {
+        Some(("primvars", rest)) => ("primvar", rest),
+        Some(("lpe", rest)) => ("lpe", rest),
+        _ => (var.source_type.as_str(), name.as_str()),
+    };
+    match kind {
+        "primvar" => match aov::canonical_name(name) {
+            "uv" => Ok("uv"),
+            "normals" | "normal" => Ok("normal"),
+            _ => Err(format!(
+                "asks for the primvar '{name}', and of primvars only texture coordinates (st) and normals are written"
+            )),
+        },
+        "lpe" if aov::canonical_name(name) != BEAUTY => {
+            Err(format!("asks for the light path expression '{name}', which needs light transport"))
+        }
+        _ => Ok(name),
+    }
+}
+
+/// Whether a layer is stored in half floats, as its variable asks for by `format`, else by `dataType`.
+fn is_half(var: &Var, aov: &Aov, diagnostics: &mut Diagnostics) -> bool {
+    let format = match text(var, "format") {
+        "auto" => "",
+        format => format,
+    };
+    let asked = if format.is_empty() { var.data_type.as_str() } else { format };
+    let base = asked.trim_end_matches("[]").trim_end_matches(|c: char| c.is_ascii_digit());
+    let wants_half = base == "half" || asked.ends_with('h') || asked == "float16";
+    let is_integer = ["int", "uint"].iter().any(|token| base.starts_with(token));
+    let mut refuse = |kind: &str, why: &str| diagnostics.warn(kind, &var.path, why);
+    match aov.sample {
+        SampleType::Uint => {
+            if !format.is_empty() && !is_integer {
+                refuse("uint-format", "asks for floats, which would round identifiers and counts: UINT is written");
+            }
+            false
+        }
+        SampleType::Float if wants_half && aov.is_sound_in_half() => true,
+        SampleType::Float => {
+            if wants_half {
+                refuse("half-format", "asks for half floats, which lose what a derivative is for: FLOAT is written");
+            } else if !format.is_empty() && is_integer {
+                refuse("int-format", "asks for integers, and its values are none: FLOAT is written");
+            }
+            false
+        }
+    }
+}
+
+/// Parameters of the driver that change nothing here are named where they would have changed something elsewhere.
+fn warn_of_parameters(var: &Var, aov: &Aov, diagnostics: &mut Diagnostics) {
+    let number = |name: &str| var.driver.get(name).map(|a| a.value.as_f64().or(a.value.as_bool().map(f64::from)));
+    if number("clearValue").is_some_and(|value| value != Some(0.0)) {
+        diagnostics.warn(
+            "unused-aov-parameter",
+            &var.path,
+            "clearValue is not written: absent values are 0, and <layer>.valid tells where they are",
+        );
+    }
+    if number("multiSampled") == Some(Some(1.0)) && aov.sample == SampleType::Uint {
+        diagnostics.warn(
+            "unused-aov-parameter",
+            &var.path,
+            "multiSampled has no effect: identifiers and counts are those of the first sample",
+        );
+    }
+    for name in var.driver.keys().filter(|name| !VAR_PARAMETERS.contains(&name.as_str())) {
+        diagnostics.warn(
+            "unused-aov-parameter",
+            &var.path,
+            format!("driver:parameters:aov:{name} has no effect here: it is another renderer's"),
+        );
+    }
+}
