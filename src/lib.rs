@@ -15,6 +15,7 @@
 //! | [`optics`] | n(λ) and its derivatives, absorption, media and their priorities |
 //! | [`ray`] | columns, transfer, scattering, footprint, chromatic motion: the calculus |
 //! | [`geometry`] | shapes, instances, trees, hits |
+//! | [`light`] | what shines: shapes, spectra, profiles |
 //! | [`texture`] | images, colour spaces, what is computed of them |
 //! | [`camera`], [`sampler`] | where rays begin |
 //! | [`scene`] | the description, its checks, the compiled scene |
@@ -35,6 +36,7 @@ pub mod exr;
 pub mod film;
 pub mod geometry;
 pub mod integrator;
+pub mod light;
 pub mod math;
 pub mod optics;
 pub mod ray;

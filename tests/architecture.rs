@@ -11,7 +11,7 @@ const LAYERS: &[&[&str]] = &[
     &["optics"],
     &["ray"],
     &["geometry"],
-    &["texture"],
+    &["light", "texture"],
     &["sampler"],
     &["scene", "camera"],
     &["film"],

@@ -78,23 +78,11 @@ fn nested(groups: Vec<Group>) -> Description {
 }
 
 fn placement(path: &str, target: Target) -> Placement {
-    Placement {
-        path: path.into(),
-        target,
-        transform: None,
-        motion: None,
-        instance: None,
-        material: None,
-        subset_materials: vec![],
-        primvars: Default::default(),
-        double_sided: false,
-        hidden_from_camera: false,
-        matte: false,
-    }
+    Placement { path: path.into(), target, ..Placement::default() }
 }
 
 fn group(path: &str, items: Vec<Placement>) -> Group {
-    Group { path: path.into(), items, instances: vec![] }
+    Group { path: path.into(), items, ..Group::default() }
 }
 
 #[test]

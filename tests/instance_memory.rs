@@ -61,14 +61,11 @@ fn bytes_beside_transforms(levels: &[(usize, f64)]) -> [f64; 2] {
         s.document.groups[level].instances.push(Instances {
             path: format!("/I{level}"),
             group: level + 1,
-            transform: None,
             transforms: format!("places{level}"),
-            indices: None,
             count,
-            motion: None,
-            places_motion: None,
+            ..Instances::default()
         });
-        s.document.groups.push(Group { path: format!("/P{level}"), items: vec![], instances: vec![] });
+        s.document.groups.push(Group { path: format!("/P{level}"), ..Group::default() });
     }
     s.document.groups[levels.len()].items = parts;
     let description = s.description();

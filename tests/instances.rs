@@ -47,21 +47,12 @@ fn places() -> Vec<DAffine3> {
 }
 
 fn instances(path: &str, group: usize, transforms: &str, count: usize) -> Instances {
-    Instances {
-        path: path.into(),
-        group,
-        transform: None,
-        transforms: transforms.into(),
-        indices: None,
-        count,
-        motion: None,
-        places_motion: None,
-    }
+    Instances { path: path.into(), group, transforms: transforms.into(), count, ..Instances::default() }
 }
 
 /// What `stagehand` and its like prepare at all places, by an array.
 fn at_places((mut s, parts): (Stagehand, Vec<Placement>)) -> Description {
-    s.document.groups.push(Group { path: "/World/P".into(), items: parts, instances: vec![] });
+    s.document.groups.push(Group { path: "/World/P".into(), items: parts, ..Group::default() });
     s.arrays.insert("places".into(), rows(&places()));
     s.document.groups[0].instances.push(instances("/World/Lamps", 1, "places", 12));
     s.description()
@@ -149,20 +140,14 @@ fn lenses_and_solids_of_an_array_are_those_placed_one_by_one() {
 
     // A group placed by itself, as native instances are.
     let (mut native, parts) = solids();
-    native.document.groups.push(Group { path: "/Prototype".into(), items: parts, instances: vec![] });
+    native.document.groups.push(Group { path: "/Prototype".into(), items: parts, ..Group::default() });
     for (i, place) in places().into_iter().enumerate() {
         native.document.groups[0].items.push(Placement {
             path: "/Prototype".into(),
             target: Target::Group(1),
             transform: Some(DMat4::from(place).to_cols_array()),
-            material: None,
-            subset_materials: vec![],
-            primvars: Default::default(),
-            motion: None,
             instance: Some(format!("/World/Lamp{i}")),
-            double_sided: false,
-            hidden_from_camera: false,
-            matte: false,
+            ..Placement::default()
         });
     }
     assert_same_pixels(&array, &scene(native.description()));
@@ -193,8 +178,8 @@ fn an_array_within_an_array_is_the_product() {
     let outer: Vec<_> = (0..3).map(|i| DAffine3::from_translation(DVec3::X * 2.0 * f64::from(i - 1))).collect();
     let inner: Vec<_> = (0..4).map(|i| DAffine3::from_translation(DVec3::Y * (f64::from(i) - 1.5))).collect();
     let (mut s, parts) = stagehand();
-    s.document.groups.push(Group { path: "/World/Q/Row".into(), items: vec![], instances: vec![] });
-    s.document.groups.push(Group { path: "/World/P".into(), items: parts.clone(), instances: vec![] });
+    s.document.groups.push(Group { path: "/World/Q/Row".into(), ..Group::default() });
+    s.document.groups.push(Group { path: "/World/P".into(), items: parts.clone(), ..Group::default() });
     s.arrays.insert("outer".into(), rows(&outer));
     s.arrays.insert("elements".into(), Array::from_vec(Element::I32, 1, vec![1, 2, 5]));
     s.arrays.insert("inner".into(), rows(&inner));
@@ -205,7 +190,7 @@ fn an_array_within_an_array_is_the_product() {
     let nested = s.build();
 
     let (mut s, parts) = stagehand();
-    s.document.groups.push(Group { path: "/World/P".into(), items: parts, instances: vec![] });
+    s.document.groups.push(Group { path: "/World/P".into(), items: parts, ..Group::default() });
     let product: Vec<_> = outer.iter().flat_map(|o| inner.iter().map(move |i| o * i)).collect();
     s.arrays.insert("places".into(), rows(&product));
     s.document.groups[0].instances.push(instances("/World/Lamps", 1, "places", 12));
@@ -226,7 +211,7 @@ fn an_array_within_an_array_is_the_product() {
 fn prototypes_of_one_instancer_share_its_identifiers() {
     let (mut s, parts) = stagehand();
     for part in parts {
-        s.document.groups.push(Group { path: part.path.clone(), items: vec![part], instances: vec![] });
+        s.document.groups.push(Group { path: part.path.clone(), items: vec![part], ..Group::default() });
     }
     let places = places();
     for (group, elements) in [(1usize, [0, 4, 9]), (2, [1, 2, 11])] {
@@ -316,7 +301,7 @@ fn explosions_and_cycles_are_refused_before_anything_is_placed() {
         let (mut s, _) = stagehand();
         s.arrays.insert("places".into(), rows(&vec![DAffine3::IDENTITY; 4096]));
         for level in 1..=3 {
-            s.document.groups.push(Group { path: format!("/World/L{level}"), items: vec![], instances: vec![] });
+            s.document.groups.push(Group { path: format!("/World/L{level}"), ..Group::default() });
             s.document.groups[level - 1].instances.push(instances(&format!("/World/I{level}"), level, "places", 4096));
         }
         s.document.groups[3].items = items;

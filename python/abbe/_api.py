@@ -333,6 +333,28 @@ class Scene:
         """
         return [Plan(text, json.loads(fields)) for text, fields in self._core.plan(_request(options))]
 
+    def lights(self) -> list[dict[str, Any]]:
+        """Tell what shines: every light as an integrator that uses lights has it.
+
+        Files of lights are read for it; what is odd about them is logged as a warning.
+
+        Returns
+        -------
+        list of dict
+            ``path``, ``kind``, ``position`` and ``direction`` in the stage's world, ``area``, ``emission`` (linear
+            Rec. 709 by luminance), ``spectrum``, ``power``, ``shaped``, ``texture``, ``group``, and the collections
+            ``illuminates`` and ``shadowed_by``; None for what a light does not have or restrict.
+
+        Raises
+        ------
+        AbbeError
+            A file of a light cannot be read and missing files are errors.
+        """
+        lights, warnings = self._core.lights()
+        for warning in warnings:
+            _log.warning("%s", warning_text(warning))
+        return lights
+
     def trace(self, pixel: tuple[int, int], sample: int = 0, **options: Unpack[Options]) -> dict[str, Any]:
         """Follow one sample and tell every event of its chain.
 

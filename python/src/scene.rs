@@ -11,6 +11,7 @@ use abbe::Error;
 use abbe::integrator::Registry;
 use abbe::render::{self, Control, Plan, Progress, Rendered, Request};
 use abbe::scene::description::Description;
+use abbe::scene::lights::Summary;
 use abbe::scene::{Scene, file};
 use numpy::PyUntypedArray;
 use pyo3::prelude::*;
@@ -101,6 +102,16 @@ impl PyScene {
             };
             Ok(self.plans(request)?.iter().map(as_pair).collect())
         })
+    }
+
+    /// The lights as integrators that use them have them, and what was odd about them: (lights, warnings).
+    fn lights<'py>(&self, py: Python<'py>) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (lights, summaries) = released(py, || {
+            let lights = self.scene.lights()?;
+            let summaries = Summary::all(&self.scene, &lights);
+            Ok((lights, summaries))
+        })?;
+        Ok((json::to_python(py, &summaries)?, json::to_python(py, &lights.diagnostics)?))
     }
 
     /// Every event of one sample's chain, with its columns.

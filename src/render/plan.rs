@@ -23,9 +23,9 @@ use crate::geometry::Shape;
 use crate::integrator::transmittance::absorbs;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
 use crate::optics::dispersion::Dispersion;
-use crate::scene::Scene;
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
+use crate::scene::{Scene, lights};
 use crate::spectrum::{Wavelength, lines};
 
 /// A decision with its reason.
@@ -307,8 +307,16 @@ fn reasons(
             None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
         }
     }
+    let unused = format!("the integrator '{}' has no use for them", integrator.name());
+    let kinds: Vec<_> =
+        lights::kinds(scene.document()).into_iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+    if kinds.is_empty() {
+        note(false, "light sampling, emission", unused);
+    } else {
+        note(false, &format!("lights ({})", kinds.join(", ")), unused.clone());
+        note(false, "emission", unused);
+    }
     textures::decide(scene, layers, needs, &mut note);
-    note(false, "light sampling, emission", format!("the integrator '{}' has no use for them", integrator.name()));
     if scene.objects.hides_some() {
         note(
             true,

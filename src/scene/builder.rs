@@ -10,6 +10,8 @@ use std::time::Duration;
 use rayon::prelude::*;
 
 use super::description::{self, Array, Description, Document, Element, Placement};
+use super::lights;
+use super::links::{self, Links};
 use super::manifest::Manifest;
 use super::material::{self, Context, Material, Resources, ScalarIor};
 use super::meshes;
@@ -30,6 +32,8 @@ pub fn build(description: Description) -> Result<Scene> {
     let mut diagnostics = document.warnings.clone();
     check_stage(document)?;
     unroll::check_groups(&description)?;
+    links::check(&description)?;
+    lights::check(&description, &mut diagnostics)?;
     let Unrolled { singles, prototypes, arrays, mut instances } = unroll::unroll(&description, &mut diagnostics)?;
 
     let placed = || singles.iter().chain(prototypes.iter().flatten());
@@ -54,6 +58,7 @@ pub fn build(description: Description) -> Result<Scene> {
         seen: vec![false; shapes.len()],
         triangles: 0,
     };
+    let mut links = Links::new(&description);
     let mut objects = Vec::with_capacity(singles.len());
     for single in &singles {
         let Some((shape, PartIds { prim_id, material_ids, appearance, .. })) =
@@ -67,23 +72,25 @@ pub fn build(description: Description) -> Result<Scene> {
         };
         let primvars = constants(single.placement, &primvars)?;
         let world_from_object = single.transform.clone();
+        links.push(single.placement);
         objects.push(Object { shape, world_from_object, prim_id, instance_id, material_ids, primvars, appearance });
     }
     let prototypes = prototypes
         .iter()
         .map(|placed| {
-            let (mut parts, mut ids) = (Vec::new(), Vec::new());
+            let (mut parts, mut ids, mut placements) = (Vec::new(), Vec::new(), Vec::new());
             for part in placed {
                 let Some((shape, part_ids)) = compiler.part(part, &mut diagnostics)? else { continue };
                 let part_ids = PartIds { primvars: constants(part.placement, &primvars)?, ..part_ids };
                 parts.push(Part { shape, place_from_object: part.transform.clone() });
                 ids.push(part_ids);
+                placements.push(part.placement);
             }
-            Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids)))
+            Ok((Arc::<[Part]>::from(parts), Arc::<[PartIds]>::from(ids), placements))
         })
         .collect::<Result<Vec<_>>>()?;
     let arrays = arrays.into_iter().filter_map(|array| {
-        let (parts, ids) = &prototypes[array.prototype];
+        let (parts, ids, placements) = &prototypes[array.prototype];
         let instances = InstanceArray {
             parts: Arc::clone(parts),
             places: array.places,
@@ -92,7 +99,11 @@ pub fn build(description: Description) -> Result<Scene> {
         };
         let parts = Arc::clone(ids);
         let placed = ObjectArray { instances, parts, first_id: array.first_id, indices: array.indices };
-        (!placed.instances.is_empty()).then_some(placed)
+        let has_places = !placed.instances.is_empty();
+        if has_places {
+            links.push_array(placements.iter().copied(), array.link_sets);
+        }
+        has_places.then_some(placed)
     });
     let objects = Objects::new(objects, arrays.collect());
     let Compiler { prims, seen, triangles, .. } = compiler;
@@ -106,6 +117,7 @@ pub fn build(description: Description) -> Result<Scene> {
     let textures = Arc::new(textures);
     Ok(Scene {
         objects,
+        links,
         materials,
         textures,
         display_color,
@@ -397,6 +409,11 @@ impl<'a> NamedArrays<'a> {
     /// Shares the memory of an array of doubles.
     pub(super) fn doubles<T: bytemuck::Pod>(&self, name: &str, columns: usize) -> Result<Buffer<T>> {
         self.share(name, Element::F64, columns)
+    }
+
+    /// What is in an array of bytes.
+    pub(super) fn bytes(&self, name: &str) -> Result<&'a [u8]> {
+        Ok(&self.get(name, Element::U8, 1)?.bytes)
     }
 
     /// Shares the memory of an array of integers.

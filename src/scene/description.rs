@@ -57,6 +57,9 @@ pub struct Document {
     pub textures: Vec<Texture>,
     /// Cameras, referred to by index. The first is the default.
     pub cameras: Vec<Camera>,
+    /// What some light does not reach or some shadow leaves out: each distinct membership once, referred to by index.
+    #[serde(default)]
+    pub link_sets: Vec<LinkSet>,
     /// Render settings, products flattened.
     #[serde(default)]
     pub settings: Settings,
@@ -209,6 +212,12 @@ pub enum Shape {
     Lens(Lens),
     /// A polygon mesh.
     Mesh(Mesh),
+}
+
+impl Default for Target {
+    fn default() -> Self {
+        Self::Shape(0)
+    }
 }
 
 impl Shape {
@@ -394,7 +403,7 @@ pub struct Subset {
 }
 
 /// Things placed together.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Group {
     /// For messages: a prim path.
@@ -404,10 +413,13 @@ pub struct Group {
     /// What stands in it many times.
     #[serde(default)]
     pub instances: Vec<Instances>,
+    /// What shines in it.
+    #[serde(default)]
+    pub lights: Vec<Light>,
 }
 
 /// A group placed by an array of transforms: those elements of a point instancer that show one prototype.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Instances {
     /// Prim path of the instancer; the `instance_id` is that of `path[index]`.
@@ -425,6 +437,9 @@ pub struct Instances {
     pub indices: Option<String>,
     /// Elements of the instancer, hidden ones and those of other prototypes included.
     pub count: usize,
+    /// The link sets of all that this places; those of what is placed if absent.
+    #[serde(default)]
+    pub link_sets: Option<Vec<usize>>,
     /// The surrounding group's space from the instancer's at other times.
     #[serde(default)]
     pub motion: Option<Motion>,
@@ -434,7 +449,7 @@ pub struct Instances {
 }
 
 /// A shape or a group, placed.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Placement {
     /// Prim path as it appears on the composed stage; the `prim_id` of shapes.
@@ -469,6 +484,9 @@ pub struct Placement {
     /// Lit and shaded from both sides; for glass the sides are decided by the normal alone.
     #[serde(default)]
     pub double_sided: bool,
+    /// Indices into [`Document::link_sets`], increasing: see [`LinkSet::excludes`].
+    #[serde(default)]
+    pub link_sets: Vec<usize>,
 }
 
 /// What a placement places.
@@ -557,6 +575,169 @@ pub struct Shader {
     /// Authored `inputs:abbe:…`, keyed without `inputs:`, connections followed.
     #[serde(default)]
     pub abbe: AuthoredMap,
+}
+
+/// A light as authored (UsdLux), the schema's fallbacks filled in. Rect, disk and distant lights shine along their −z, the
+/// cylinder lies along x.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Light {
+    /// Prim path.
+    pub path: String,
+    /// What shines.
+    pub shape: LightShape,
+    /// The group's space from the light's; identity if absent.
+    #[serde(default)]
+    pub transform: Option<[f64; 16]>,
+    /// `inputs:intensity`: luminance in nits, relative to the colour.
+    pub intensity: f64,
+    /// `inputs:exposure`: a power of two on it.
+    pub exposure: f64,
+    /// `inputs:normalize`: divided by the light's size.
+    pub normalize: bool,
+    /// `inputs:color`, linear Rec. 709.
+    pub color: [f64; 3],
+    /// `inputs:enableColorTemperature`.
+    pub enable_color_temperature: bool,
+    /// `inputs:colorTemperature`, kelvin.
+    pub color_temperature: f64,
+    /// `inputs:diffuse`: a factor on what diffuse materials receive.
+    pub diffuse: f64,
+    /// `inputs:specular`: a factor on what specular materials receive.
+    pub specular: f64,
+    /// What UsdLuxShapingAPI says; absent where it is neither applied nor authored.
+    #[serde(default)]
+    pub shaping: Option<LightShaping>,
+    /// What UsdLuxShadowAPI says; absent where it is neither applied nor authored.
+    #[serde(default)]
+    pub shadow: Option<LightShadow>,
+    /// What it illuminates: index into [`Document::link_sets`], everything if absent.
+    #[serde(default)]
+    pub light_link: Option<usize>,
+    /// What casts shadows in its light: index into [`Document::link_sets`], everything if absent.
+    #[serde(default)]
+    pub shadow_link: Option<usize>,
+    /// Authored `abbe:…` attributes.
+    #[serde(default)]
+    pub abbe: AuthoredMap,
+    /// Authored `physical:…` attributes (PhysicalLightIlluminantAPI), keyed without that prefix.
+    #[serde(default)]
+    pub physical: AuthoredMap,
+}
+
+/// What a light is.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "snake_case")]
+pub enum LightShape {
+    /// Light from one direction, or from a disk of sky.
+    Distant {
+        /// Its diameter, degrees.
+        angle: f64,
+    },
+    /// Light from everywhere.
+    Dome {
+        /// What it looks like: index into [`Document::textures`]; white if absent.
+        texture: Option<usize>,
+        /// `automatic`, `latlong`, `mirroredBall`, `angular` or `cubeMapVerticalCross`.
+        format: String,
+        /// Which axis of the light its upper pole is on: `Y` or `Z`.
+        pole_axis: String,
+        /// Radius at which other software draws it.
+        guide_radius: f64,
+        /// Paths of the portal lights through which it shines.
+        portals: Vec<String>,
+    },
+    /// A rectangle.
+    Rect {
+        /// Along x.
+        width: f64,
+        /// Along y.
+        height: f64,
+        /// What it looks like: index into [`Document::textures`]; white if absent.
+        texture: Option<usize>,
+    },
+    /// A disk.
+    Disk {
+        /// Its radius.
+        radius: f64,
+    },
+    /// A sphere.
+    Sphere {
+        /// Its radius.
+        radius: f64,
+        /// It may be taken for a point.
+        treat_as_point: bool,
+    },
+    /// The side of a cylinder.
+    Cylinder {
+        /// Along x.
+        length: f64,
+        /// Its radius.
+        radius: f64,
+        /// It may be taken for a line.
+        treat_as_line: bool,
+    },
+    /// Geometry that shines.
+    Geometry {
+        /// Paths of placements.
+        prims: Vec<String>,
+        /// `materialGlowTintsLight`, `independent` or `noMaterialResponse`.
+        material_sync_mode: String,
+    },
+    /// A rectangle through which a dome shines; no light by itself.
+    Portal {
+        /// Along x.
+        width: f64,
+        /// Along y.
+        height: f64,
+    },
+}
+
+/// Where a light's emission goes (UsdLuxShapingAPI).
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightShaping {
+    /// Exponent of the cosine to the axis.
+    pub focus: f64,
+    /// Colour off the axis.
+    pub focus_tint: [f64; 3],
+    /// Beyond it there is no light, degrees.
+    pub cone_angle: f64,
+    /// Part of the cone over which light fades.
+    pub cone_softness: f64,
+    /// Photometric profile.
+    #[serde(default)]
+    pub ies: Option<Asset>,
+    /// How the profile's angles are scaled; 0 leaves them.
+    pub ies_angle_scale: f64,
+    /// The profile shapes the light without changing its power.
+    pub ies_normalize: bool,
+}
+
+/// Shadows in the light of one light (UsdLuxShadowAPI).
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightShadow {
+    /// Whether there are any.
+    pub enable: bool,
+    /// What is seen in full shadow.
+    pub color: [f64; 3],
+    /// Occluders farther from the surface than this cast none; negative: all do.
+    pub distance: f64,
+    /// Length of the zone before that in which shadows fade; none unless positive.
+    pub falloff: f64,
+    /// Exponent of the fading.
+    pub falloff_gamma: f64,
+}
+
+/// A collection that a light or its shadows are linked to.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinkSet {
+    /// The first collection with these members, such as `/Lamp.collection:lightLink`.
+    pub path: String,
+    /// Placements outside of the collection list the set; else those in it do. The bridge takes the shorter way.
+    pub excludes: bool,
 }
 
 /// A camera as authored (UsdGeomCamera: apertures and focal length in tenths of a stage unit).

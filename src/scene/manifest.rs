@@ -36,6 +36,11 @@ impl Manifest {
         Some(first as u32)
     }
 
+    /// The identifier of `entry`'s first path; `None` where there is no such entry.
+    pub(super) fn find(&self, entry: &str) -> Option<u32> {
+        self.by_entry.get(entry).copied()
+    }
+
     /// The entries in the order of their identifiers.
     pub fn entries(&self) -> &[String] {
         &self.entries

@@ -6,6 +6,8 @@
 pub mod builder;
 pub mod description;
 pub mod file;
+pub mod lights;
+mod links;
 mod manifest;
 pub mod material;
 mod meshes;
@@ -21,6 +23,7 @@ use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 use crate::texture::{Program, Store};
 use description::{Description, Document};
+use links::Links;
 pub use manifest::Manifest;
 use material::Material;
 pub use objects::{Appearance, ConstantPrimvars, Object, ObjectArray, ObjectIds, Objects, PartIds};
@@ -30,6 +33,7 @@ pub use objects::{Appearance, ConstantPrimvars, Object, ObjectArray, ObjectIds, 
 pub struct Scene {
     /// Placed shapes in the order of the description.
     pub objects: Objects,
+    links: Links,
     /// Materials bound to some object, in the order of the description.
     pub materials: Vec<Material>,
     /// Images that materials name.
@@ -69,6 +73,17 @@ impl Scene {
     /// Errors name the prim concerned; oddities that were repaired stand in [`diagnostics`](Self::diagnostics).
     pub fn build(description: Description) -> Result<Self> {
         builder::build(description)
+    }
+
+    /// The lights, compiled now: their files are read. Only integrators that use lights ask.
+    pub fn lights(&self) -> Result<lights::Lights> {
+        lights::compile(self)
+    }
+
+    /// Whether an object is in a link set: what [`Light::illuminates`](crate::light::Light::illuminates) and
+    /// [`Light::shadowed_by`](crate::light::Light::shadowed_by) refer to.
+    pub fn is_linked(&self, set: u32, object: u32) -> bool {
+        self.links.contains(set, self.objects.location(object))
     }
 
     /// What the bridge and the builder had to say.

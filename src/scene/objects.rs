@@ -165,6 +165,11 @@ impl Objects {
         *primvars.as_ref()?.get(number)?
     }
 
+    /// Where the object `index` is among the single ones and the arrays.
+    pub(super) fn location(&self, index: u32) -> Location {
+        self.numbering.locate(index)
+    }
+
     /// The identifiers of the object `index`.
     pub fn ids(&self, index: u32) -> ObjectIds<'_> {
         match self.numbering.locate(index) {

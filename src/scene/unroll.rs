@@ -37,7 +37,7 @@ pub(super) struct Placed<'a> {
 }
 
 /// A prototype placed by an array.
-pub(super) struct PlacedArray {
+pub(super) struct PlacedArray<'a> {
     /// Index into [`Unrolled::prototypes`].
     pub(super) prototype: usize,
     pub(super) places: Buffer<[f64; 12]>,
@@ -47,6 +47,8 @@ pub(super) struct PlacedArray {
     /// `instance_id` of the instancer's element 0, and which element stands at each place.
     pub(super) first_id: u32,
     pub(super) indices: Option<Buffer<i32>>,
+    /// Link sets of all parts, in place of their own.
+    pub(super) link_sets: Option<&'a [usize]>,
 }
 
 /// Everything placed.
@@ -54,7 +56,7 @@ pub(super) struct Unrolled<'a> {
     pub(super) singles: Vec<Placed<'a>>,
     /// What the arrays place.
     pub(super) prototypes: Vec<Vec<Placed<'a>>>,
-    pub(super) arrays: Vec<PlacedArray>,
+    pub(super) arrays: Vec<PlacedArray<'a>>,
     /// Names of the arrays' elements.
     pub(super) instances: Manifest,
 }
@@ -76,6 +78,8 @@ struct Open<'a> {
     /// The arrays around it, and which combination of their places this is.
     around: usize,
     ordinal: u64,
+    /// Link sets of what the outer arrays place.
+    link_sets: Option<&'a [usize]>,
 }
 
 /// Arrays around an array.
@@ -111,7 +115,8 @@ pub(super) fn unroll<'a>(description: &'a Description, diagnostics: &mut Diagnos
         left_out: Vec::new(),
         samples,
     };
-    let mut level: Vec<_> = nested.into_iter().map(|nested| Open { nested, around: 0, ordinal: 0 }).collect();
+    let mut level: Vec<_> =
+        nested.into_iter().map(|nested| Open { nested, around: 0, ordinal: 0, link_sets: None }).collect();
     while !level.is_empty() {
         let mut next = Vec::new();
         for open in level {
@@ -141,7 +146,7 @@ struct Unroller<'a, 'd> {
     by_group: HashMap<usize, usize>,
     around: Vec<Around>,
     named: HashMap<(usize, Key), Named>,
-    arrays: Vec<PlacedArray>,
+    arrays: Vec<PlacedArray<'a>>,
     instances: Manifest,
     left_out: Vec<(&'a str, usize)>,
     samples: Samples,
@@ -151,6 +156,7 @@ impl<'a> Unroller<'a, '_> {
     /// Places an array, and puts what its prototype nests on `next`.
     fn place(&mut self, open: &Open<'a>, next: &mut Vec<Open<'a>>) -> Result<()> {
         let Nested { key, instances, ref transform } = open.nested;
+        let link_sets = open.link_sets.or(instances.link_sets.as_deref());
         let arrays = NamedArrays { description: self.description, place: &instances.path };
         let places: Buffer<[f64; 12]> = arrays.doubles(&instances.transforms, 12)?;
         if places.is_empty() {
@@ -168,7 +174,7 @@ impl<'a> Unroller<'a, '_> {
                 self.samples.count(&pose, &instances.path)?;
                 let nested = Nested { transform: pose, ..inner.clone() };
                 let ordinal = open.ordinal * places.len() as u64 + place as u64;
-                next.push(Open { nested, around: named.around, ordinal });
+                next.push(Open { nested, around: named.around, ordinal, link_sets });
             }
         }
         if parts.is_empty() {
@@ -199,7 +205,7 @@ impl<'a> Unroller<'a, '_> {
         // The manifest has room for all combinations, so that this one fits.
         let first_id = named.first_id + (open.ordinal * elements) as u32;
         let transform = transform.clone();
-        self.arrays.push(PlacedArray { prototype, places, motion, transform, first_id, indices });
+        self.arrays.push(PlacedArray { prototype, places, motion, transform, first_id, indices, link_sets });
         Ok(())
     }
 
@@ -369,7 +375,7 @@ fn pose_of(
 }
 
 /// USD's row-vector matrix as an affine map of column vectors; `None` with a warning if it is none.
-fn place_of(matrix: Option<&[f64; 16]>, path: &str, diagnostics: &mut Diagnostics) -> Option<DAffine3> {
+pub(super) fn place_of(matrix: Option<&[f64; 16]>, path: &str, diagnostics: &mut Diagnostics) -> Option<DAffine3> {
     let Some(matrix) = matrix else { return Some(DAffine3::IDENTITY) };
     let problem = if matrix.iter().any(|v| !v.is_finite()) {
         "its transform has a value that is not finite: it is left out"

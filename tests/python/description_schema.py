@@ -30,7 +30,7 @@ def _load():
                 key = renamed[1] if renamed else match["name"]
                 fields[key] = (key, match["type"], "default" in serde or match["type"].startswith("Option<"))
             structs[name] = fields
-        elif name in ("Shape", "Target"):
+        elif name in ("Shape", "Target", "LightShape"):
             enums[name] = {}
             for variant, fields, tuple_variant, content in _VARIANT.findall(body):
                 key = (variant or tuple_variant).lower()
@@ -78,11 +78,11 @@ def _check(value, type_name, where):
         _check(value, "Vec<Warning>", where)
     elif type_name == "serde_json::Value":
         _check_json(value, where)
-    elif type_name == "Shape":
+    elif type_name in ("Shape", "LightShape"):
         assert isinstance(value, dict) and len(value) == 1, f"{where}: {value!r} is no shape"
         ((kind, content),) = value.items()
-        assert kind in _ENUMS["Shape"], f"{where}: {value!r}"
-        fields = _ENUMS["Shape"][kind]
+        assert kind in _ENUMS[type_name], f"{where}: {value!r}"
+        fields = _ENUMS[type_name][kind]
         if isinstance(fields, str):
             _check(content, fields, f"{where}.{kind}")
         else:

@@ -202,7 +202,6 @@ def test_what_is_left_out_is_counted_or_named():
         "invisible": 1,
         "purpose guide": 1,
         "purpose proxy": 1,
-        "lights: not asked for": 2,
     }
     named = {warning["message"].split()[0]: warning for warning in warned(description, "unsupported-prim")}
     assert set(named) == {"BasisCurves"}

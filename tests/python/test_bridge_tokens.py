@@ -21,6 +21,7 @@ def test_our_names_and_types_are_those_of_the_plug_in():
     ours = {
         "AbbeDispersionAPI": tokens.MATERIAL_NAMES,
         "AbbeLensAPI": tokens.LENS_NAMES,
+        "AbbeLightAPI": tokens.LIGHT_NAMES,
         "AbbeSubdivisionAPI": tokens.MESH_NAMES,
         "AbbeRenderSettingsAPI": tokens.SETTINGS_NAMES,
         "AbbeRenderVarAPI": tokens.VAR_NAMES,

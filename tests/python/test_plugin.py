@@ -61,6 +61,19 @@ SCHEMAS = {
             "abbe:lens:back:semiDiameter": ("double", VARYING, 0.0, None),
         },
     ),
+    "AbbeLightAPI": (
+        "DomeLight",
+        {
+            "abbe:illuminant": (
+                "token",
+                UNIFORM,
+                "",
+                ["", "D65", "D50", "D55", "D75", "A", "E", "FL2", "FL7", "FL11", "blackbody", "table"],
+            ),
+            "abbe:spectrum:table": ("double2[]", UNIFORM, [], None),
+            "abbe:lightGroup": ("string", UNIFORM, "", None),
+        },
+    ),
     "AbbeSubdivisionAPI": ("Mesh", {"abbe:subdivision:level": ("int", UNIFORM, 2, None)}),
     "AbbeRenderSettingsAPI": (
         "RenderSettings",
@@ -100,7 +113,8 @@ if len(sys.argv) > 1:
 stage = Usd.Stage.CreateInMemory()
 registry = Usd.SchemaRegistry()
 found = {}
-for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeLensAPI", "Mesh"), ("AbbeSubdivisionAPI", "Mesh"),
+for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeLensAPI", "Mesh"), ("AbbeLightAPI", "DomeLight"),
+                     ("AbbeSubdivisionAPI", "Mesh"),
                      ("AbbeRenderSettingsAPI", "RenderSettings"), ("AbbeRenderVarAPI", "RenderVar")):
     definition = registry.FindAppliedAPIPrimDefinition(name)
     if definition is None:

@@ -45,7 +45,7 @@ impl Stagehand {
                 motion: None,
             },
             shapes: vec![],
-            groups: vec![Group { path: "/".into(), items: vec![], instances: vec![] }],
+            groups: vec![Group { path: "/".into(), ..Group::default() }],
             root: 0,
             materials: vec![],
             cameras: vec![],
@@ -54,6 +54,7 @@ impl Stagehand {
             skipped: BTreeMap::new(),
             textures: Vec::new(),
             strict_assets: false,
+            link_sets: Vec::new(),
         };
         Self { document, arrays: Arrays::new() }
     }
@@ -187,14 +188,8 @@ impl Stagehand {
             path: path.into(),
             target: Target::Shape(shape),
             transform: Some(transform.to_cols_array()),
-            motion: None,
-            instance: None,
             material,
-            subset_materials: vec![],
-            primvars: Default::default(),
-            double_sided: false,
-            hidden_from_camera: false,
-            matte: false,
+            ..Placement::default()
         });
     }
 

@@ -24,6 +24,8 @@ from .description import Array, ArrayTable, BrokenError, Description, Diagnostic
 from .geometry import ShapeReader
 from .instancers import InstancerReader
 from .lenses import is_lens
+from .lights import LightReader, is_light
+from .links import link_lights
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
 from .passes import Appearance, RenderPass, find_pass
@@ -58,6 +60,9 @@ class _Kind(enum.Enum):
     LEAF = enum.auto()
 
 
+_GEOMETRY = (_Kind.MESH, _Kind.SPHERE, _Kind.SOLID, _Kind.LENS)
+
+
 def _classify(prim: Any) -> _Kind:
     """Return what to do with prims of this one's type; LEAF where nothing below can be rendered."""
     if prim.IsA(UsdGeom.Mesh):
@@ -68,8 +73,11 @@ def _classify(prim: Any) -> _Kind:
         return _Kind.SOLID
     if prim.IsA(UsdGeom.Camera):
         return _Kind.CAMERA
-    if prim.HasAPI(UsdLux.LightAPI) or any(prim.IsA(base) for base in _light_schemas()):
+    if prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase):
         return _Kind.LIGHT
+    if prim.IsA(UsdLux.LightFilter):
+        # Of those that a light asks for, the light's reader speaks.
+        return _Kind.LEAF
     if prim.IsA(UsdGeom.PointInstancer):
         return _Kind.INSTANCER
     if prim.GetTypeName() in ("SkelRoot", "Skeleton"):
@@ -83,11 +91,6 @@ def _classify(prim: Any) -> _Kind:
     return _Kind.PASS_THROUGH
 
 
-def _light_schemas() -> list[Any]:
-    names = ("BoundableLightBase", "NonboundableLightBase", "LightFilter")
-    return [getattr(UsdLux, name) for name in names if hasattr(UsdLux, name)]
-
-
 class _Facts(NamedTuple):
     """What a prim says of itself; the same for a prim of a prototype under every instance."""
 
@@ -95,6 +98,8 @@ class _Facts(NamedTuple):
     invisible: bool
     purpose: str | None
     """None where none is authored."""
+    shines: bool
+    """It is a light by type, or geometry that is one too."""
 
 
 class _State(NamedTuple):
@@ -116,6 +121,14 @@ class _Placed(NamedTuple):
     item: dict[str, Any]
 
 
+class _Light(NamedTuple):
+    """A light on its way into the description."""
+
+    prim: Any
+    transform: list[float] | None
+    """None where it is placed as a shape."""
+
+
 @dataclass
 class _Group:
     """What is placed together: the stage, or a prototype of point instancers."""
@@ -125,6 +138,7 @@ class _Group:
     """The prototype's root prim, whose own transform is that of the instances; None for the stage."""
     placed: list[_Placed] = field(default_factory=list)
     instances: list[dict[str, Any]] = field(default_factory=list)
+    lights: list[_Light] = field(default_factory=list)
 
 
 # Deeper nesting of instancers than this nobody models, and Python's own stack would end soon after.
@@ -204,7 +218,7 @@ class _Walk:
                 if kind is _Kind.INSTANCER:
                     self._instance(prim, source or prim, str(path), state, group)
                 elif kind is not _Kind.PASS_THROUGH:
-                    self._visit(prim, source or prim, str(path), kind, state, group)
+                    self._visit(prim, source or prim, str(path), facts, state, group)
                 elif prim.IsModel():
                     self._check_draw_mode(prim, state)
             except BrokenError as broken:
@@ -223,7 +237,10 @@ class _Walk:
 
         def has_something(root: Any) -> bool:
             index = self._prototype(root, prim, state)
-            return index is not None and bool(self.groups[index].placed or self.groups[index].instances)
+            if index is None:
+                return False
+            group = self.groups[index]
+            return bool(group.placed or group.instances or group.lights)
 
         transform = self._transform(prim, group)
         for elements in self.instancers.elements(prim, source, has_something):
@@ -289,12 +306,16 @@ class _Walk:
             kind = self._kinds[type_name] = _classify(prim)
         if kind in (_Kind.MESH, _Kind.PASS_THROUGH) and is_lens(prim):
             kind = _Kind.LENS
+        shines = kind is _Kind.LIGHT or is_light(prim)
+        if shines and kind is _Kind.PASS_THROUGH:
+            kind = _Kind.LIGHT
         attribute = prim.GetAttribute(tokens.PURPOSE)
         authored = bool(attribute) and attribute.HasAuthoredValue()
         return _Facts(
             kind,
             read(prim, tokens.VISIBILITY, self.time) == tokens.INVISIBLE,
             str(read(prim, tokens.PURPOSE, self.time) or tokens.DEFAULT) if authored else None,
+            shines,
         )
 
     @staticmethod
@@ -323,16 +344,14 @@ class _Walk:
         own = self._pass.appearance(prim.GetPath())
         return Appearance(own.hidden or state.appearance.hidden, own.matte or state.appearance.matte)
 
-    def _visit(self, prim: Any, source: Any, path: str, kind: _Kind, state: _State, group: _Group) -> None:
+    def _visit(self, prim: Any, source: Any, path: str, facts: _Facts, state: _State, group: _Group) -> None:
         """Do with a prim what its kind asks for; ``source`` is what it shares with other instances, or itself."""
+        kind = facts.kind
         if kind is _Kind.CAMERA:
             if group.root is None:
                 self.cameras.append(prim)
             return
         if not self._is_rendered(prim):
-            return
-        if kind is _Kind.LIGHT:
-            self.diagnostics.skip("lights: not asked for")
             return
         if not state.visible:
             self.diagnostics.skip("invisible")
@@ -343,6 +362,10 @@ class _Walk:
             return
         if purpose != tokens.DEFAULT and self._hides(prim, purpose):
             self.diagnostics.skip("invisible")
+            return
+        if facts.shines:
+            group.lights.append(_Light(prim, None if kind in _GEOMETRY else self._transform(prim, group)))
+        if kind is _Kind.LIGHT:
             return
         if kind is _Kind.MESH:
             self._place(prim, path, self.shapes.mesh(prim, source), state, group)
@@ -443,6 +466,24 @@ class _Walk:
             if group.instances:
                 groups[-1]["instances"] = group.instances
         return groups
+
+    def shine(self, reader: LightReader, groups: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Add lights to the groups, which are bound, and return the sets that they are linked to."""
+        lights = []
+        for group, described in zip(self.groups, groups, strict=True):
+            for prim, transform in group.lights:
+                try:
+                    light = reader.read(prim, is_geometry=transform is None)
+                except BrokenError as broken:
+                    self.diagnostics.leave_out(broken)
+                    continue
+                if light is None:
+                    continue
+                if transform is not None and transform != IDENTITY:
+                    light["transform"] = transform
+                described.setdefault("lights", []).append(light)
+                lights.append((light, prim))
+        return link_lights(groups, lights, self.diagnostics)
 
     def arrays(self) -> dict[str, Array]:
         """Return all arrays by name."""
@@ -563,6 +604,8 @@ def _read(
     assets = AssetReader(stage, time)
     materials = MaterialReader(time, diagnostics, _binding_purposes(settings_prim), assets)
     groups = walk.bind(materials)
+    metadata = stage_metadata(opened, time_code, diagnostics)
+    link_sets = walk.shine(LightReader(time, metadata["up_axis"], assets, diagnostics), groups)
 
     cameras: list[dict[str, Any]] = []
     index_by_camera: dict[Any, int] = {}
@@ -573,7 +616,6 @@ def _read(
             cameras.append(read_camera(prim, time, walk.places.cache))
         return index_by_camera[prim]
 
-    metadata = stage_metadata(opened, time_code, diagnostics)
     chosen = find_camera(stage, camera, source) if camera else default_camera(stage, settings_prim, walk.cameras)
     if chosen is not None:
         camera_index(chosen)
@@ -596,6 +638,7 @@ def _read(
         "materials": materials.materials,
         "textures": assets.textures,
         "cameras": cameras,
+        "link_sets": link_sets,
         "settings": settings,
         "warnings": diagnostics.warnings(),
         "skipped": diagnostics.skipped,

@@ -171,6 +171,49 @@ PRIMVAR_READER_TYPES: Final = {
     "matrix": "matrix4d",
 }
 
+# Lights; names without `inputs:`, as they were before USD 21.02.
+INTENSITY: Final = "intensity"
+EXPOSURE: Final = "exposure"
+NORMALIZE: Final = "normalize"
+COLOR: Final = "color"
+ENABLE_COLOR_TEMPERATURE: Final = "enableColorTemperature"
+COLOR_TEMPERATURE: Final = "colorTemperature"
+DIFFUSE: Final = "diffuse"
+SPECULAR: Final = "specular"
+ANGLE: Final = "angle"
+TREAT_AS_POINT: Final = "treatAsPoint"
+TREAT_AS_LINE: Final = "treatAsLine"
+TEXTURE_FILE: Final = "texture:file"
+TEXTURE_FORMAT: Final = "texture:format"
+AUTOMATIC: Final = "automatic"
+POLE_AXIS: Final = "poleAxis"
+SCENE: Final = "scene"
+GUIDE_RADIUS: Final = "guideRadius"
+PORTALS: Final = "portals"
+GEOMETRY: Final = "geometry"
+MATERIAL_SYNC_MODE: Final = "light:materialSyncMode"
+NO_MATERIAL_RESPONSE: Final = "noMaterialResponse"
+LIGHT_FILTERS: Final = "light:filters"
+OLD_LIGHT_FILTERS: Final = "filters"
+SHAPING: Final = "shaping"
+SHAPING_FOCUS: Final = "shaping:focus"
+SHAPING_FOCUS_TINT: Final = "shaping:focusTint"
+SHAPING_CONE_ANGLE: Final = "shaping:cone:angle"
+SHAPING_CONE_SOFTNESS: Final = "shaping:cone:softness"
+SHAPING_IES_FILE: Final = "shaping:ies:file"
+SHAPING_IES_ANGLE_SCALE: Final = "shaping:ies:angleScale"
+SHAPING_IES_NORMALIZE: Final = "shaping:ies:normalize"
+SHADOW: Final = "shadow"
+SHADOW_ENABLE: Final = "shadow:enable"
+SHADOW_COLOR: Final = "shadow:color"
+SHADOW_DISTANCE: Final = "shadow:distance"
+SHADOW_FALLOFF: Final = "shadow:falloff"
+SHADOW_FALLOFF_GAMMA: Final = "shadow:falloffGamma"
+LIGHT_LINK: Final = "lightLink"
+SHADOW_LINK: Final = "shadowLink"
+# PhysicalLightIlluminantAPI, of a proposal to OpenUSD.
+PHYSICAL: Final = "physical"
+
 # Cameras.
 PERSPECTIVE: Final = "perspective"
 CAMERA: Final = "camera"
@@ -260,6 +303,11 @@ LENS_NAMES: Final = {
     "abbe:lens:back:aspheres": "double[]",
     "abbe:lens:back:semiDiameter": "double",
 }
+LIGHT_NAMES: Final = {
+    "abbe:illuminant": "token",
+    "abbe:spectrum:table": "double2[]",
+    "abbe:lightGroup": "string",
+}
 MESH_NAMES: Final = {SUBDIVISION_LEVEL: "int"}
 SCALAR_IOR: Final = "abbe:scalarIor"
 SETTINGS_NAMES: Final = {
@@ -283,10 +331,22 @@ VAR_NAMES: Final = {
     "abbe:spectral:band": "double2",
     "abbe:spectral:binWidth": "double",
 }
+LIGHT_TYPES: Final = (
+    "DistantLight",
+    "DomeLight",
+    "DomeLight_1",
+    "RectLight",
+    "DiskLight",
+    "SphereLight",
+    "CylinderLight",
+    "GeometryLight",
+    "PortalLight",
+)
 OUR_SCHEMAS: Final = {
     "Material": MATERIAL_NAMES,
-    "Mesh": {**LENS_NAMES, **MESH_NAMES},
+    "Mesh": {**LENS_NAMES, **MESH_NAMES, **LIGHT_NAMES},
     "Xform": LENS_NAMES,
     RENDER_SETTINGS: SETTINGS_NAMES,
     RENDER_VAR: VAR_NAMES,
+    **dict.fromkeys(LIGHT_TYPES, LIGHT_NAMES),
 }
