@@ -206,7 +206,7 @@ fn a_clipping_plane_cuts_a_ball_open() {
             let first = chain.first.unwrap();
             assert!(first.point.x * 0.8 + (first.point.z) * -0.6 - 3.6 > 0.0);
         } else {
-            assert!(chain.start_medium.ior == 1.0, "{start:?}");
+            assert!(chain.start_medium.ior < 1.1, "{start:?}");
         }
     }
     assert!(counts.iter().all(|&n| n > 2), "{counts:?}");
@@ -298,7 +298,7 @@ fn every_ray_begins_in_the_medium_where_it_begins() {
         let sample = CameraSample { raster: [24.5, 16.5], lens, time: 0.5 };
         let start = set.camera.ray(&sample);
         let chain: Chain<NoColumns> = set.chain(&sample);
-        assert_eq!(chain.start_medium.ior == 1.33, start.point.y + 0.01 < 0.0, "{lens:?}");
+        assert_eq!(chain.start_medium.ior > 1.3, start.point.y + 0.01 < 0.0, "{lens:?}");
     }
 }
 

@@ -83,6 +83,14 @@ class ExrImage:
                 raise ValueError(f"attribute {LAYERS} is no list of layers: {error}") from None
         return self._layers
 
+    def is_half(self, layer: str) -> bool:
+        """Tell whether the header says that a layer is stored in half floats."""
+        try:
+            entries = json.loads(self.text(LAYERS) or "[]")
+            return any(entry.get("name") == layer and entry.get("half") is True for entry in entries)
+        except (json.JSONDecodeError, AttributeError, TypeError):
+            return False
+
     def channel(self, layer: str, suffix: str) -> np.ndarray | None:
         """Return the channel ``layer.suffix``, or ``suffix`` for the empty layer name; None if there is none."""
         return self.channels.get(channel_name(layer, suffix))

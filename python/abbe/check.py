@@ -30,6 +30,8 @@ _MOST_EVENTS = 64
 # Three float32 components of a unit vector, each rounded to half a unit in the last place, move its length by less
 # than 2**-24 * sqrt(3); a length below 1 by rounding of a mean adds no more. Four times that is no unit vector.
 _UNIT_TOLERANCE = 4 * math.sqrt(3) * 2.0**-24
+# The same for halves.
+_HALF_UNIT_TOLERANCE = 4 * math.sqrt(3) * 2.0**-11
 
 # Required header attributes and the types they may have.
 _NUMBER = (int, float)
@@ -429,7 +431,8 @@ class _Checker:
     def layer(self, name: str, row: AovRow) -> list[str]:
         """Check one layer; returns the channels it has a claim to."""
         suffixes = [str(suffix) for suffix in row["channels"]]
-        wanted = np.uint32 if row["sample"] == "uint" else np.float32
+        is_half = self.image.is_half(name) and row["sample"] != "uint"
+        wanted = np.uint32 if row["sample"] == "uint" else np.float16 if is_half else np.float32
         names = [channel_name(name, suffix) for suffix in suffixes]
         valid: np.ndarray | None = None
         if row["has_validity"]:
@@ -453,6 +456,8 @@ class _Checker:
         if not complete:
             return names
         values = np.stack([self.image.channels[channel] for channel in names[: len(suffixes)]], axis=-1)
+        if is_half:
+            values = values.astype(np.float32)
         if valid is not None:
             outside = ~((valid >= 0) & (valid <= 1))
             self.fail_where(outside & np.isfinite(valid), "must be in 0..1", names[-1], valid)
@@ -460,7 +465,7 @@ class _Checker:
                 present = (valid == 0) & (values[:, :, i] != 0)
                 self.fail_where(present, "must be 0 where valid is 0", channel, values[:, :, i])
         some = np.ones(values.shape[:2], bool) if valid is None else valid > 0
-        self.ranges(names, str(row["name"]), values, some, valid)
+        self.ranges(names, str(row["name"]), values, some, valid, _HALF_UNIT_TOLERANCE if is_half else _UNIT_TOLERANCE)
         inside = values[some]
         inside = inside[np.isfinite(inside)] if inside.dtype.kind == "f" else inside
         self.report.layers.append(
@@ -478,7 +483,13 @@ class _Checker:
         return names
 
     def ranges(
-        self, names: Sequence[str], aov: str, values: np.ndarray, some: np.ndarray, valid: np.ndarray | None
+        self,
+        names: Sequence[str],
+        aov: str,
+        values: np.ndarray,
+        some: np.ndarray,
+        valid: np.ndarray | None,
+        tolerance: float,
     ) -> None:
         """Values that the AOV cannot have."""
         first = values[:, :, 0]
@@ -496,9 +507,9 @@ class _Checker:
             length = np.sqrt(np.sum(np.square(values, dtype=np.float64), axis=-1))
             length = np.where(np.isfinite(length), length, 1.0)
             where = "the mean of unit vectors cannot be longer than 1"
-            self.fail_where(some & (length > 1 + _UNIT_TOLERANCE), where, names[0], length)
+            self.fail_where(some & (length > 1 + tolerance), where, names[0], length)
             if self.samples == 1 and valid is not None:
-                off = (valid == 1) & (np.abs(length - 1) > _UNIT_TOLERANCE)
+                off = (valid == 1) & (np.abs(length - 1) > tolerance)
                 self.fail_where(
                     off & (length < 1), "the vector of a single sample must have length 1", names[0], length
                 )

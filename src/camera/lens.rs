@@ -65,6 +65,7 @@ mod tests {
     }
 
     #[test]
+    #[allow(clippy::float_cmp, reason = "the centre is exact")]
     fn the_square_fills_the_disk_and_no_more() {
         let lens = Lens { radius: 2.0, focus: 1.0 };
         assert_eq!(lens.point([0.5, 0.5]), [0.0, 0.0]);

@@ -170,7 +170,8 @@ fn window(request: &Request, product: Option<&Product>, resolution: [u32; 2]) ->
 
 /// A range that holds nothing is ignored, and said so.
 fn check_clipping(camera: &description::Camera, diagnostics: &mut Diagnostics) {
-    if let Some([near, far]) = camera.clipping_range.filter(|[near, far]| !(near < far)) {
+    if let Some([near, far]) = camera.clipping_range.filter(|[near, far]| near >= far || near.is_nan() || far.is_nan())
+    {
         diagnostics.warn(
             "clipping-range",
             format!("{}.clippingRange", camera.path),

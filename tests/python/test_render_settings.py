@@ -15,6 +15,7 @@ import OpenImageIO as oiio
 from pxr import Gf, Sdf, Usd, UsdGeom
 
 import abbe
+import abbe.check
 
 Run = Callable[..., Any]
 
@@ -186,6 +187,7 @@ def test_layers_and_headers_are_as_drivers_ask(tmp_path: Path) -> None:
     opened = stage(lens, driver, prims, "</Render/N>, </Render/Far>, </Render/Near>")
     film = beauty(opened, depth_of_field=False)
     film.write(tmp_path / "out.exr")
+    assert abbe.check.check(tmp_path / "out.exr").failures == []
     image = oiio.ImageInput.open(str(tmp_path / "out.exr"))
     spec = image.spec()
     types = dict(zip(spec.channelnames, map(str, spec.channelformats), strict=True))

@@ -73,7 +73,7 @@ class LightReader:
             "path": str(prim.GetPath()),
             "shape": read_shape(prim),
             "intensity": self._number(prim, tokens.INTENSITY),
-            "exposure": self._number(prim, tokens.EXPOSURE),
+            "exposure": self._number(prim, tokens.LIGHT_EXPOSURE),
             "normalize": self._flag(prim, tokens.NORMALIZE),
             "color": self._color(prim, tokens.COLOR),
             "enable_color_temperature": self._flag(prim, tokens.ENABLE_COLOR_TEMPERATURE),

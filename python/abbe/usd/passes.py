@@ -15,7 +15,7 @@ from ._pxr import Usd, UsdRender
 from .description import Diagnostics
 from .values import place, read
 
-__all__ = ["Appearance", "RenderPass", "find_pass"]
+__all__ = ["ActivePass", "Appearance", "find_pass"]
 
 
 class Appearance(NamedTuple):
@@ -25,7 +25,7 @@ class Appearance(NamedTuple):
     matte: bool = False
 
 
-class RenderPass:
+class ActivePass:
     """What a RenderPass makes of the prims of its stage."""
 
     def __init__(self, prim: Any, settings: str | None) -> None:
@@ -64,7 +64,7 @@ def _members(prim: Any, name: str) -> Any:
     return collection.ComputeMembershipQuery() if authored else None
 
 
-def find_pass(stage: Any, wanted: str, source: str, diagnostics: Diagnostics) -> RenderPass:
+def find_pass(stage: Any, wanted: str, source: str, diagnostics: Diagnostics) -> ActivePass:
     """Return the RenderPass at ``wanted``.
 
     Raises
@@ -91,7 +91,7 @@ def find_pass(stage: Any, wanted: str, source: str, diagnostics: Diagnostics) ->
     relationship = prim.GetRelationship(tokens.RENDER_SOURCE)
     targets = relationship.GetForwardedTargets() if relationship else []
     if not targets:
-        return RenderPass(prim, None)
+        return ActivePass(prim, None)
     if len(targets) > 1:
         diagnostics.warn(
             "render-pass",
@@ -99,6 +99,6 @@ def find_pass(stage: Any, wanted: str, source: str, diagnostics: Diagnostics) ->
             f"has {len(targets)} targets; the first, <{targets[0]}>, is rendered",
         )
     where = f"{place(prim)}.{tokens.RENDER_SOURCE}"
-    return RenderPass(
+    return ActivePass(
         prim, str(typed_prim(stage, str(targets[0]), UsdRender.Settings, tokens.RENDER_SETTINGS, where).GetPath())
     )

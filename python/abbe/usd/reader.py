@@ -28,7 +28,7 @@ from .lights import LightReader, is_light
 from .links import link_lights
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
-from .passes import Appearance, RenderPass, find_pass
+from .passes import ActivePass, Appearance, find_pass
 from .places import Places
 from .primvars import PrimvarReader
 from .render import find_settings, read_settings, token_list
@@ -153,7 +153,7 @@ class _Walk:
         opened: OpenedStage,
         time: Any,
         purposes: frozenset[str],
-        render_pass: RenderPass | None,
+        render_pass: ActivePass | None,
         level: int | None,
         diagnostics: Diagnostics,
     ) -> None:

@@ -173,7 +173,7 @@ PRIMVAR_READER_TYPES: Final = {
 
 # Lights; names without `inputs:`, as they were before USD 21.02.
 INTENSITY: Final = "intensity"
-EXPOSURE: Final = "exposure"
+LIGHT_EXPOSURE: Final = "exposure"
 NORMALIZE: Final = "normalize"
 COLOR: Final = "color"
 ENABLE_COLOR_TEMPERATURE: Final = "enableColorTemperature"
