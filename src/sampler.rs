@@ -1,12 +1,15 @@
 //! Where in the pixel, on the lens and in the shutter's time samples are taken: decided by (pixel, sample index, seed) alone.
 //!
-//! Dimensions of the Sobol' sequence: 0, 1 the position in the pixel (x right, y down); 2, 3 the point on the lens. They
-//! come from one call and cost nothing where they are not used.
+//! Dimensions of the Sobol' sequence: 0, 1 the position in the pixel (x right, y down); 2, 3 the point on the lens, from one
+//! call with them; 4 the time.
 
 use crate::error::{Error, Result};
 
 /// The most samples a pixel can have: the length of the Sobol' sequence that `sobol_burley` holds.
 pub const MAX_SAMPLES: u32 = 1 << 16;
+
+/// The Sobol' dimension of the time.
+const TIME: u32 = 4;
 
 /// Everything that a camera ray depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +39,7 @@ impl CameraSample {
 pub struct Sampler {
     samples: u32,
     seed: u64,
+    over_time: bool,
 }
 
 impl Sampler {
@@ -44,7 +48,12 @@ impl Sampler {
         if samples == 0 || samples > MAX_SAMPLES {
             return Err(Error::usage("--samples", format!("must be 1 to {MAX_SAMPLES}, not {samples}")));
         }
-        Ok(Self { samples, seed })
+        Ok(Self { samples, seed, over_time: false })
+    }
+
+    /// The same sampler, with samples spread over time, or all in the middle of it. Nothing else of a sample changes.
+    pub fn over_time(self, over_time: bool) -> Self {
+        Self { over_time, ..self }
     }
 
     /// Sample `index` of `pixel`.
@@ -58,7 +67,9 @@ impl Sampler {
         }
         let seed = hash(self.seed ^ (u64::from(pixel[0] as u32) << 32 | u64::from(pixel[1] as u32)));
         let [dx, dy, u, v] = sobol_burley::sample_4d(index, 0, (seed ^ (seed >> 32)) as u32).map(f64::from);
-        CameraSample { raster: [x + dx, y + dy], lens: [u, v], time: 0.5 }
+        let time =
+            if self.over_time { sobol_burley::sample(index, TIME, (seed ^ (seed >> 32)) as u32).into() } else { 0.5 };
+        CameraSample { raster: [x + dx, y + dy], lens: [u, v], time }
     }
 }
 

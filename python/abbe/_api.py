@@ -14,7 +14,18 @@ from typing import Any, Literal, NamedTuple, TypedDict, Unpack
 from . import _core
 from .errors import UsageError
 
-__all__ = ["Options", "Plan", "Progress", "Scene", "counted", "integrators", "merge", "render", "warning_text"]
+__all__ = [
+    "Options",
+    "Plan",
+    "Progress",
+    "Scene",
+    "asks_for_motion",
+    "counted",
+    "integrators",
+    "merge",
+    "render",
+    "warning_text",
+]
 
 _log = logging.getLogger("abbe")
 
@@ -58,6 +69,7 @@ class Options(TypedDict, total=False):
     wavelength: float | None
     band: tuple[float, float] | None
     dispersion_scale: float | None
+    motion_blur: bool | None
     seed: int | None
     threads: int | None
     texture_memory: int | None
@@ -107,6 +119,13 @@ def _request(options: Options) -> str:
         except (TypeError, ValueError) as error:
             raise UsageError(f"{name}: {error}: give plain finite numbers, text or lists of them") from None
     return "{" + ",".join(texts) + "}"
+
+
+def asks_for_motion(aovs: Sequence[str] | None) -> bool | None:
+    """Tell whether some of ``aovs`` are vectors of motion; None, for the stage to decide, if there are none."""
+    from .usd.tokens import MOTION_SOURCES
+
+    return None if aovs is None else not {*aovs}.isdisjoint(MOTION_SOURCES)
 
 
 def counted(count: int, what: str) -> str:
@@ -183,6 +202,8 @@ class Scene:
         mask: Sequence[str] = (),
         payloads: str = "all",
         missing: str = "warn",
+        motion_blur: bool | None = None,
+        motion_vectors: bool | None = None,
         complexity: str | None = None,
         scalar_ior: str | None = None,
         strict: bool = False,
@@ -205,6 +226,8 @@ class Scene:
         mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
         payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
         missing : what to do where a layer, prim or texture that is referred to is missing: ``"warn"`` or ``"error"``
+        motion_blur : whether to read motion while shutters are open; as the stage's products say if None
+        motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
         complexity : ``"low"``, ``"medium"``, ``"high"``, ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
             ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
         scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
@@ -241,6 +264,8 @@ class Scene:
             mask=mask,
             payloads=payloads,
             missing=missing,
+            motion_blur=motion_blur,
+            motion_vectors=motion_vectors,
             complexity=complexity,
             scalar_ior=scalar_ior,
             strict=strict,
@@ -472,6 +497,7 @@ def render(
     wavelength: float | None = None,
     band: tuple[float, float] | None = None,
     dispersion_scale: float | None = None,
+    motion_blur: bool | None = None,
     seed: int | None = None,
     threads: int | None = None,
     texture_memory: int | None = None,
@@ -511,6 +537,7 @@ def render(
     wavelength : reference wavelength, nm
     band : ends of the wavelength band of footprints, nm
     dispersion_scale : multiplies all dispersion: 0 none, 1 physical
+    motion_blur : whether samples are spread over the time that the shutter is open
     seed : same seed, same bits, on any number of threads
     threads : all of the machine's if None
     texture_memory : for the texels of images, MB, 4294 if None; what does not fit goes to a temporary file
@@ -553,6 +580,8 @@ def render(
         mask=mask,
         payloads=payloads,
         missing=missing,
+        motion_blur=motion_blur,
+        motion_vectors=asks_for_motion(aovs),
         complexity=complexity,
         scalar_ior=scalar_ior,
         strict=strict,
@@ -569,6 +598,7 @@ def render(
         wavelength=wavelength,
         band=band,
         dispersion_scale=dispersion_scale,
+        motion_blur=motion_blur,
         seed=seed,
         threads=threads,
         texture_memory=texture_memory,

@@ -42,6 +42,13 @@ impl Clipping {
         Self { planes: range.iter().flatten().chain(planes).filter_map(in_render).collect() }
     }
 
+    /// The same planes in a render space whose zero stands at `offset` of the old one.
+    pub(super) fn moved(&self, offset: DVec3) -> Self {
+        let move_plane =
+            |plane: &Plane| Plane { normal: plane.normal, offset: plane.offset + plane.normal.dot(offset) };
+        Self { planes: self.planes.iter().map(move_plane).collect() }
+    }
+
     /// Without the planes that cut nothing off the box from `min` to `max`.
     pub fn of_box(&self, [min, max]: [DVec3; 2]) -> Self {
         let cuts = |plane: &&Plane| {

@@ -167,8 +167,8 @@ fn a_view_of_parallel_rays_may_begin_behind_its_camera() {
     assert!((distance - 2.0).abs() < 1e-15);
     // Depth is that of the camera, wherever the ray begins.
     let p = plain.position + b.point + 3.0 * b.direction;
-    assert!((behind.depth(p - behind.position) - 3.0).abs() < 1e-14);
-    assert!((plain.depth(p - plain.position) - 3.0).abs() < 1e-14);
+    assert!((behind.depth(p - behind.position, 0.0) - 3.0).abs() < 1e-14);
+    assert!((plain.depth(p - plain.position, 0.0) - 3.0).abs() < 1e-14);
 }
 
 #[test]

@@ -21,7 +21,7 @@ use crate::ray::{
 use crate::render::Plan;
 use crate::sampler::CameraSample;
 use crate::scene::Scene;
-use crate::scene::view::{Media, View};
+use crate::scene::view::Media;
 use crate::spectrum::Wavelength;
 
 /// Steps of the finite differences, nm.
@@ -102,7 +102,7 @@ pub struct Comparison {
 /// Compares on the image of `plan`, in `rounds` rounds, on the calling thread.
 pub fn compare(scene: &Scene, plan: &Plan, rounds: usize) -> Result<Comparison> {
     let camera = crate::render::camera(scene, plan)?;
-    let view = View::new(scene, camera.position);
+    let view = crate::render::view(scene, plan, &camera);
     let follower = Follower::of_camera(&view, &camera);
     let tracer = Tracer { scene, follower: &follower, scale: plan.optics.dispersion_scale };
     let nm = plan.optics.reference.nanometers();

@@ -43,6 +43,8 @@ pub enum Family {
     ScreenSecondOrder,
     /// Exact displacement by tracing again at another wavelength.
     Retrace,
+    /// Exact displacement by tracing again at another time.
+    MotionRetrace,
 }
 
 /// One row of the table.
@@ -112,6 +114,11 @@ const fn first(name: &'static str, unit: &'static str, family: Family, doc: &'st
 
 /// The one AOV that the absorption of media is summed for.
 pub const INTERNAL_TRANSMITTANCE: &str = "internal_transmittance";
+
+/// Motion on screen of the first surface, for which no ray is traced at another time.
+pub const MOTION: &str = "motion";
+/// Motion on screen of what is seen through glass, which is traced again at the frame and at the next one.
+pub const REFRACTED_MOTION: &str = "refracted_motion";
 
 /// Whether an AOV is that of a surface's color.
 pub fn is_albedo(aov: &Aov) -> bool {
@@ -225,6 +232,20 @@ pub static AOVS: &[Aov] = &[
     ),
     mean("uv", UV, "1", Family::FirstSurface, "texture coordinates of the first surface"),
     mean(
+        MOTION,
+        XY,
+        "pixel/frame",
+        Family::FirstSurface,
+        "motion on screen of the first surface's point from this frame to the next (time code + 1), +x right, +y up, whatever the shutter; of the direction on a miss",
+    ),
+    mean(
+        REFRACTED_MOTION,
+        XY,
+        "pixel/frame",
+        Family::MotionRetrace,
+        "the same of the chain's end as it is seen through the glass, both of which may move; absent where the next frame does not show it through as many interfaces",
+    ),
+    mean(
         "albedo",
         RGB,
         "1",
@@ -298,6 +319,7 @@ pub static ALIASES: &[(&str, &str)] = &[
     ("Nn", "normal"),
     ("Ng", "normal_geometric"),
     ("st", "uv"),
+    ("motionvector", MOTION),
     ("Albedo", "albedo"),
     ("Ci", "color"),
     ("C", "color"),

@@ -342,17 +342,12 @@ impl Aggregate {
         })
     }
 
-    /// Whether the box about `points`, which is passed in time if it is a `path`, meets that of where an instance that
-    /// `is_member` is at any time, and one of them moves or deforms.
-    pub fn any_about(&self, points: &[DVec3], is_path: bool, is_member: impl Fn(u32) -> bool) -> bool {
-        let all = points.iter().fold(Bounds::EMPTY, |all, &p| all.union(&Bounds { min: p, max: p }));
-        self.tree.any_meeting(&all, |i| {
-            let instance = self.instance(i);
-            let moves = is_path
-                || self.is_instance_moving(instance)
-                || matches!(self.shape(instance), Shape::Mesh(mesh) if mesh.is_deforming());
-            moves && is_member(instance)
-        })
+    /// Whether anything in it moves.
+    pub fn is_moving(&self) -> bool {
+        let deforms = |shape: &Shape| matches!(shape, Shape::Mesh(mesh) if mesh.is_deforming());
+        self.is_array_moving.contains(&true)
+            || self.singles.iter().any(|(shape, standing)| matches!(standing, Standing::Moving(_)) || deforms(shape))
+            || self.arrays.iter().any(|array| array.parts.iter().any(|part| deforms(&part.shape)))
     }
 
     /// Whether some surface of an instance that `is_member` may lie in the box `[min, max]`, in render space; a no is certain.

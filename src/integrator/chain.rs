@@ -197,6 +197,8 @@ pub struct Follower<'a> {
     outside: Outside,
     /// What a camera does not see; `None` if it sees everything.
     unseen: Option<Clipping>,
+    /// The camera, if it moves.
+    camera: Option<Camera>,
 }
 
 /// The media where rays start.
@@ -213,9 +215,10 @@ enum Outside {
 impl<'a> Follower<'a> {
     /// For rays that start at the camera of `view` and see everything.
     pub fn new(view: &'a View<'a>) -> Self {
-        let outside =
-            if view.is_eye_passing_glass() { Outside::Different } else { Outside::Same(view.media_around_eye(0.0)) };
-        Self { view, outside, unseen: None }
+        let zero = DVec3::ZERO;
+        let passing = view.aggregate.is_moving() && view.has_glass_in([zero; 2]);
+        let outside = if passing { Outside::Different } else { Outside::Same(view.media_at(zero, 0.0)) };
+        Self { view, outside, unseen: None, camera: None }
     }
 
     /// For the rays of `camera`, whose position is the origin of `view`.
@@ -226,11 +229,23 @@ impl<'a> Follower<'a> {
             Some(starts) => Outside::SameWithin(starts, view.media_at(0.5 * (starts[0] + starts[1]), 0.0)),
         };
         let clipping = match view.aggregate.bounds() {
+            Some(_) if camera.is_moving() => camera.clipping().clone(),
             Some(bounds) if !camera.clipping().is_empty() => camera.clipping().of_box(bounds),
             _ => Clipping::default(),
         };
         let unseen = (view.scene.objects.hides_some() || !clipping.is_empty()).then_some(clipping);
-        Self { view, outside, unseen }
+        Self { view, outside, unseen, camera: camera.is_moving().then(|| camera.clone()) }
+    }
+
+    /// Where the camera sees surfaces on a ray.
+    fn sight(&self, start: &RayStart) -> Option<Sight> {
+        let clipping = self.unseen.as_ref()?;
+        // The planes move with the camera; a map of both changes no distance along the ray.
+        let (mut point, mut direction) = (start.point, start.direction);
+        if let Some(frame) = self.camera.as_ref().and_then(|camera| camera.frame_from_time(start.time)) {
+            (point, direction) = (frame.transform_point3(point), frame.transform_vector3(direction));
+        }
+        Some(clipping.sight(point, direction))
     }
 
     fn media_around(&self, start: &RayStart) -> MediaStack {
@@ -422,7 +437,7 @@ impl<'a> Walk<'a> {
             departures: Departures::none(),
             travelled: 0.0,
             crossings: 0,
-            sight: follower.unseen.as_ref().map(|clipping| clipping.sight(start.point, start.direction)),
+            sight: follower.sight(start),
             begin: 0.0,
             begins_anew: false,
             is_lost: false,

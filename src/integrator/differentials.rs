@@ -7,14 +7,15 @@
 use glam::{DVec2, DVec3};
 
 use super::chain::{Chain, Counters, End, Follower, Record, SurfacePoint};
+use super::search::{EndKind, EndState, Wanted};
 use super::transmittance::{Coefficients, Segment};
-use super::{Columns, Integrator, PreparedIntegrator, Task, Worker};
+use super::{Columns, Integrator, PreparedIntegrator, Task, Worker, screen_motion};
 use crate::error::{Error, Result};
-use crate::film::aov::{AOVS, Aov, Family, INTERNAL_TRANSMITTANCE};
+use crate::film::aov::{AOVS, Aov, Family, INTERNAL_TRANSMITTANCE, MOTION};
 use crate::film::pixel::PixelAccumulator;
 use crate::ray::{
     ColumnSet, LambdaColumn, NoColumns, RayStart, ScreenColumns, SecondOrderColumns, Step, direction_derivative,
-    direction_second_derivative, half_width, screen_motion, second_order_along,
+    direction_second_derivative, half_width, second_order_along,
 };
 use crate::sampler::CameraSample;
 use crate::scene::material::{Kind, Material};
@@ -52,6 +53,7 @@ enum Output {
     Motion,
     Motion2,
     Fetch(usize),
+    SeenMotion,
     Ior,
     IorByLambda,
     AbbeNumber,
@@ -69,6 +71,7 @@ enum SurfaceValue {
     Normal,
     NormalGeometric,
     Uv,
+    Motion,
     Albedo,
     PrimId,
     InstanceId,
@@ -109,6 +112,8 @@ impl Output {
             "normal" => SurfaceValue::Normal,
             "normal_geometric" => SurfaceValue::NormalGeometric,
             "uv" => SurfaceValue::Uv,
+            MOTION if whose == Whose::First => SurfaceValue::Motion,
+            MOTION => return Self::SeenMotion,
             "albedo" => SurfaceValue::Albedo,
             "prim_id" => SurfaceValue::PrimId,
             "instance_id" => SurfaceValue::InstanceId,
@@ -245,6 +250,11 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
                     let offset = self.fetch_offset(place, &start, &sample, channel);
                     out.add(layer, offset);
                 }
+                Output::SeenMotion => {
+                    let motion =
+                        screen_motion::of_end(task, follower, media, place, &start, &chain, &mut self.counters);
+                    out.add(layer, motion);
+                }
                 Output::Ior => {
                     let ior = dielectric.map(|jet| jet.ior);
                     out.add(layer, scalar(ior));
@@ -293,7 +303,7 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
         let view: &View<'_> = task.view;
         let object = met.map(|met| view.scene.objects.ids(met.hit.instance));
         match value {
-            SurfaceValue::Depth => out.add(layer, scalar(met.map(|met| task.camera.depth(met.point)))),
+            SurfaceValue::Depth => out.add(layer, scalar(met.map(|met| task.camera.depth(met.point, arriving.time)))),
             SurfaceValue::Position => out.add(layer, met.map(|met| view.origin + met.point)),
             SurfaceValue::Normal => {
                 let facing = |met: &SurfacePoint| {
@@ -308,6 +318,7 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
                 let uv = met.and_then(|met| view.aggregate.uv(&met.hit, met.point));
                 out.add(layer, uv);
             }
+            SurfaceValue::Motion => out.add(layer, screen_motion::of_surface(task, arriving, met)),
             SurfaceValue::Albedo => {
                 self.counters.albedo_lookups += u64::from(met.is_some());
                 out.add(layer, met.map(|met| view.albedo(&met.hit, met.material_id)));
@@ -319,8 +330,7 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
     }
 
     /// Exact displacement at a channel's wavelength as a fetch offset: what is seen at `place` there, is seen at
-    /// `place` + offset at the reference wavelength. Newton's method with the screen columns, started from the
-    /// first-order motion, until a step no longer changes the offset.
+    /// `place` + offset at the reference wavelength. Started from the first-order motion.
     fn fetch_offset(
         &mut self,
         place: &CameraSample,
@@ -328,96 +338,24 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
         sample: &Sample<'_, C>,
         channel: usize,
     ) -> Option<DVec2> {
-        /// Newton doubles the digits at each step: eight reach the last one from any start that converges at all.
-        const MAX_STEPS: usize = 8;
-        /// Where steps below this many pixels stop to shrink is decided by rounding of the hit point: a thousandth of
-        /// what an EXR float can tell at one pixel.
-        const CONVERGED: f64 = 1e-10;
-        /// Offsets that still move by more than this have no digits worth writing.
-        const ACCEPTED: f64 = 1e-6;
-
         let Prepared { task, follower, media, channel_media, .. } = self.prepared;
         if !sample.chain.is_dispersive {
             return sample.end.exists().then_some(DVec2::ZERO);
         }
         self.counters.retraces += 1;
         let target = follower.follow::<NoColumns>(start, &channel_media[channel], Record::none(), &mut self.counters);
-        let seen = EndState::new(&target);
         let delta = task.optics.channels[channel].nanometers() - task.optics.reference.nanometers();
-        let mut offset = sample.motion().map_or(DVec2::ZERO, |motion| -motion * delta);
-        let mut last_step = f64::INFINITY;
-        for _ in 0..MAX_STEPS {
-            let moved = task.camera.ray(&place.moved(offset.x, -offset.y));
-            self.counters.retraces += 1;
-            let chain = follower.follow::<ScreenColumns>(&moved, media, Record::none(), &mut self.counters);
-            if chain.interfaces != target.interfaces || chain.total_reflections != target.total_reflections {
-                return None;
-            }
-            let here = EndState::new(&chain);
-            let residual = here.difference_to(&seen)?;
-            let [v_x, v_y] = here.screen_columns(&chain)?;
-            let step = screen_motion(v_x, v_y, -residual, here.normal)?;
-            offset += step;
-            let length = step.length();
-            if length <= CONVERGED || (length >= last_step && length <= ACCEPTED) {
-                return Some(offset);
-            }
-            last_step = length;
-        }
-        (last_step <= ACCEPTED).then_some(offset)
+        let offset = sample.motion().map_or(DVec2::ZERO, |motion| -motion * delta);
+        let wanted = Wanted::of(&target);
+        wanted.find(offset, &mut self.counters, |offset, counters| {
+            let moved = task.camera.ray_at(&place.moved(offset.x, -offset.y), start.time);
+            follower.follow(&moved, media, Record::none(), counters)
+        })
     }
 }
 
 fn scalar(value: Option<f64>) -> Option<[f64; 1]> {
     value.map(|v| [v])
-}
-
-/// The end of a chain as screen motion sees it: a point on a surface, or a direction.
-#[derive(Clone, Copy)]
-struct EndState {
-    kind: EndKind,
-    /// The point or the direction.
-    value: DVec3,
-    /// n_g or the direction.
-    normal: DVec3,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum EndKind {
-    Surface,
-    Miss,
-    None,
-}
-
-impl EndState {
-    fn new<C>(chain: &Chain<C>) -> Self {
-        match &chain.end {
-            End::Surface(met) => Self { kind: EndKind::Surface, value: met.point, normal: met.surface.n_g },
-            End::Miss => Self { kind: EndKind::Miss, value: chain.direction, normal: chain.direction },
-            End::Exhausted => Self { kind: EndKind::None, value: DVec3::ZERO, normal: DVec3::ZERO },
-        }
-    }
-
-    fn exists(&self) -> bool {
-        self.kind != EndKind::None
-    }
-
-    /// From here to `other`, if both are of one kind.
-    fn difference_to(&self, other: &Self) -> Option<DVec3> {
-        (self.kind == other.kind && self.exists()).then(|| other.value - self.value)
-    }
-
-    /// ∂/∂x and ∂/∂y of the point or direction.
-    fn screen_columns<C: ColumnSet>(&self, chain: &Chain<C>) -> Option<[DVec3; 2]> {
-        let columns = chain.columns.screen()?;
-        match self.kind {
-            EndKind::Surface => Some(columns.map(|c| c.point)),
-            EndKind::Miss => {
-                Some(columns.map(|c| direction_derivative(c.momentum, chain.direction, chain.medium.ior, 0.0)))
-            }
-            EndKind::None => None,
-        }
-    }
 }
 
 /// One followed chain with what can be said of its derivatives.
@@ -493,7 +431,7 @@ impl<C: ColumnSet> Sample<'_, C> {
         } else {
             self.direction_by_lambda()?
         };
-        screen_motion(v_x, v_y, v_lambda, self.end.normal)
+        crate::ray::screen_motion(v_x, v_y, v_lambda, self.end.normal)
     }
 
     /// Absent where 1 nm moves more than the image's diagonal: a caustic as seen from the eye.
@@ -517,6 +455,6 @@ impl<C: ColumnSet> Sample<'_, C> {
             let first = direction_derivative(along.momentum, self.chain.direction, medium.ior, medium.dior_dlambda);
             direction_second_derivative(along.momentum2, self.chain.direction, first, medium)
         };
-        screen_motion(v_x, v_y, second, self.end.normal)
+        crate::ray::screen_motion(v_x, v_y, second, self.end.normal)
     }
 }

@@ -6,6 +6,8 @@
 
 pub mod chain;
 pub mod differentials;
+mod screen_motion;
+mod search;
 pub mod transmittance;
 
 use std::sync::Arc;
@@ -118,6 +120,8 @@ pub struct Task<'a> {
     pub samples: SampleRange,
     /// Full raster, pixels.
     pub resolution: [u32; 2],
+    /// Whether something moves and vectors of motion are wanted; they are 0 if not.
+    pub motion_vectors: bool,
 }
 
 /// A way to compute pixels, chosen by name.

@@ -42,7 +42,8 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
         "abbe:sign",
         text(
             "dispersion: motion of the feature seen here per nm of increasing wavelength; dispersion_r/_g/_b: fetch offset, \
-             look up the image here + offset",
+             look up the image here + offset; \
+             motion, refracted_motion: from this frame to the next one",
         ),
     );
     set("abbe:metersPerUnit", Attribute::Double(stage.meters_per_unit));
@@ -50,6 +51,9 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
     set("abbe:camera", text(&plan.camera_path));
     if let Some(time) = stage.time_code {
         set("abbe:timeCode", Attribute::Double(time));
+    }
+    if let Some([open, close]) = plan.shutter {
+        set("abbe:shutter", Attribute::Text(format!("{open}:{close} frames from the time code")));
     }
     set("abbe:samples", Attribute::Int(plan.samples.total as i32));
     set("abbe:seed", Attribute::Text(plan.seed.to_string()));
@@ -168,6 +172,7 @@ fn settings_hash(scene: &Scene, plan: &Plan) -> String {
         "conformPolicy": format!("{:?}", plan.conform_policy),
         "samples": plan.samples.total,
         "seed": plan.seed,
+        "shutter": plan.shutter,
         "integrator": plan.integrator,
         "optics": plan.optics,
         "layers": layers,

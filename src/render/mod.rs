@@ -6,6 +6,7 @@
 mod driver;
 mod layers;
 pub mod metadata;
+mod motion;
 pub mod plan;
 pub mod request;
 mod settings;
@@ -132,17 +133,27 @@ pub fn render(scene: &Scene, plan: &Plan, registry: &Registry, control: &Control
 pub(crate) fn camera(scene: &Scene, plan: &Plan) -> Result<Camera> {
     let authored = &scene.document().cameras[plan.camera];
     let camera = Camera::new(authored, plan.resolution, plan.pixel_aspect_ratio, plan.conform_policy)?;
-    Ok(match Lens::of(authored) {
+    let camera = match Lens::of(authored) {
         Some(lens) if plan.depth_of_field => camera.with_lens(lens),
         _ => camera,
-    })
+    };
+    match plan.shutter {
+        Some(shutter) => camera.with_shutter(authored, shutter),
+        None if plan.motion_vectors => camera.moving(authored),
+        None => Ok(camera),
+    }
+}
+
+/// The scene as the camera of `plan` sees it.
+pub(crate) fn view<'a>(scene: &'a Scene, plan: &Plan, camera: &Camera) -> View<'a> {
+    if plan.traces_motion { View::moving(scene, camera.position) } else { View::new(scene, camera.position) }
 }
 
 fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Control<'_>) -> Result<Rendered> {
     let begin = Instant::now();
     let integrator = registry.find(&plan.integrator)?;
     let camera = camera(scene, plan)?;
-    let view = View::new(scene, camera.position);
+    let view = view(scene, plan, &camera);
     textures::prepare(scene, &plan.needs, plan.texture_memory)?;
     let aovs: Vec<&'static Aov> = plan.layers.iter().map(|layer| layer.aov).collect();
     let task = Task {
@@ -151,9 +162,10 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
         aovs: &aovs,
         needs: plan.needs,
         optics: plan.optics,
-        sampler: Sampler::new(plan.samples.total, plan.seed)?,
+        sampler: Sampler::new(plan.samples.total, plan.seed)?.over_time(plan.shutter.is_some()),
         samples: plan.samples,
         resolution: plan.resolution,
+        motion_vectors: plan.motion_vectors,
     };
     let prepared = integrator.prepare(&task)?;
     let mut film = empty_film(plan, &camera)?;
@@ -235,7 +247,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
             "clipped-by-fallback",
             format!("{}.clippingRange", authored.path),
             format!(
-                "is not authored, and its fallback ({near}, {far}) hides surfaces from {} rays: author the range that is                  wanted",
+                "is not authored, and its fallback ({near}, {far}) hides surfaces from {} rays: author the range that is wanted",
                 counters.unseen
             ),
         );

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::driver::Driver;
 use super::layers::{PlannedLayer, layers};
+use super::motion::motion_plan;
 use super::request::Request;
 use super::settings::{self, Attributes};
 use super::shot::{DepthOfField, Shot};
@@ -90,6 +91,12 @@ pub struct Plan {
     pub conform_policy: ConformPolicy,
     /// Whether samples are spread over the lens.
     pub depth_of_field: bool,
+    /// When the shutter opens and closes, frames from the scene's own, if something moves meanwhile.
+    pub shutter: Option<[f64; 2]>,
+    /// Whether something moves and vectors of motion are computed.
+    pub motion_vectors: bool,
+    /// Whether rays are traced at other times than the frame.
+    pub traces_motion: bool,
     /// Samples rendered.
     pub samples: SampleRange,
     /// Seed of the sample positions.
@@ -161,6 +168,9 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let DepthOfField { is_on, why } = &shot.depth_of_field;
     (if *is_on { &mut carried } else { &mut skipped })
         .push(Decision { what: "depth of field".to_owned(), why: why.clone() });
+    let motion = motion_plan(scene, request, product, shot.authored(scene), &aovs, &mut diagnostics);
+    (if motion.shutter.is_some() { &mut carried } else { &mut skipped })
+        .push(Decision { what: "motion blur".to_owned(), why: motion.why });
     let seed = match (request.seed, attributes.integer("abbe:seed")?) {
         (Some(seed), _) => seed,
         (None, Some(seed)) => seed as u64,
@@ -183,6 +193,9 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         pixel_aspect_ratio: shot.pixel_aspect_ratio,
         conform_policy: shot.conform_policy,
         depth_of_field: shot.depth_of_field.is_on,
+        shutter: motion.shutter,
+        motion_vectors: motion.vectors,
+        traces_motion: motion.traced,
         samples,
         seed,
         threads: settings::threads(request)?,
@@ -259,7 +272,9 @@ fn reasons(
         };
         list.push(Decision { what: what.to_owned(), why });
     };
-    use Family::{Chain, FirstSurface, LambdaColumn, LambdaSecondOrder, Retrace, ScreenColumns, ScreenSecondOrder};
+    use Family::{
+        Chain, FirstSurface, LambdaColumn, LambdaSecondOrder, MotionRetrace, Retrace, ScreenColumns, ScreenSecondOrder,
+    };
     decide(
         "wavelength column ∂λ",
         needs.columns >= Columns::Lambda,
@@ -277,7 +292,8 @@ fn reasons(
         let list = if computed { &mut carried } else { &mut skipped };
         list.push(Decision { what: what.to_owned(), why });
     };
-    let chain_asked = asked(&[Chain, LambdaColumn, LambdaSecondOrder, ScreenColumns, ScreenSecondOrder, Retrace]);
+    let chain_asked =
+        asked(&[Chain, LambdaColumn, LambdaSecondOrder, ScreenColumns, ScreenSecondOrder, Retrace, MotionRetrace]);
     if needs.chain {
         note(true, "specular chain", format!("{} about it", list(&chain_asked, "tells", "tell")));
     } else {

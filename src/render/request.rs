@@ -28,6 +28,8 @@ pub struct Request {
     pub band: Option<[f64; 2]>,
     /// Multiplies all dispersion: 0 none, 1 physical.
     pub dispersion_scale: Option<f64>,
+    /// False closes all shutters at the frame.
+    pub motion_blur: Option<bool>,
     /// Seed of the sample positions.
     pub seed: Option<u64>,
     /// Threads; all of the machine's if absent or 0. Never changes a bit of the image.

@@ -70,6 +70,13 @@ impl Shot {
     }
 }
 
+impl Shot {
+    /// The camera as authored.
+    pub(super) fn authored<'a>(&self, scene: &'a Scene) -> &'a description::Camera {
+        &scene.document().cameras[self.camera]
+    }
+}
+
 fn product_place(product: Option<&Product>) -> &str {
     product.map_or("render settings", |p| p.path.as_str())
 }

@@ -11,7 +11,7 @@ use crate::integrator::transmittance::{Coefficients, Segment};
 use crate::ray::{Column, ColumnSet, ScatterKind, SecondOrderColumns, Step};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
-use crate::scene::view::{Media, View};
+use crate::scene::view::Media;
 
 /// Follows sample `sample` of `pixel` (x right, y down) and tells every event with the columns before and after it.
 pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result<Value> {
@@ -32,10 +32,10 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
         ));
     }
     let camera = super::camera(scene, plan)?;
-    let view = View::new(scene, camera.position);
+    let view = super::view(scene, plan, &camera);
     let media = Media::at(scene, plan.optics.reference, plan.optics.dispersion_scale)?;
     let follower = Follower::of_camera(&view, &camera);
-    let place = Sampler::new(plan.samples.total, plan.seed)?.sample(pixel, sample);
+    let place = Sampler::new(plan.samples.total, plan.seed)?.over_time(plan.shutter.is_some()).sample(pixel, sample);
     let start = camera.ray(&place);
     let (mut log, mut segments) = (Vec::new(), Vec::new());
     let record = Record { steps: Some(&mut log), segments: Some(&mut segments) };
@@ -100,7 +100,8 @@ pub fn trace(scene: &Scene, plan: &Plan, pixel: [i32; 2], sample: u32) -> Result
         "sample": sample,
         "raster": place.raster,
         "wavelength_nm": plan.optics.reference.nanometers(),
-        "camera": array(view.origin),
+        "time": start.time,
+        "camera": array(view.origin + camera.position_at(start.time)),
         "direction": array(start.direction),
         "start_ior": chain.start_medium.ior,
         "last_segment": if matches!(chain.end, End::Exhausted) { Value::Null } else { way(segments.len() - 1) },

@@ -2,12 +2,12 @@
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 
 use super::Scene;
 use super::material::{Below, Kind, Material};
 use crate::error::{Error, Result};
-use crate::geometry::{Aggregate, Departures, Hit, Pose, Ray};
+use crate::geometry::{Aggregate, Departures, Hit, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
 use crate::spectrum::Wavelength;
@@ -55,8 +55,6 @@ pub struct View<'a> {
     pub aggregate: Aggregate,
     /// World position of the origin.
     pub origin: DVec3,
-    /// Where the camera is, in the world.
-    eye: Pose,
     /// Per object: whether its glass can coincide with that of another.
     touching: Vec<FoundOut>,
     /// Per object: whether it can coincide with any other.
@@ -66,41 +64,25 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     /// `scene` as it is at the frame, about the world point `origin`.
     pub fn new(scene: &'a Scene, origin: DVec3) -> Self {
-        Self::build(scene, origin, DAffine3::from_translation(origin).into(), false)
+        Self::build(scene, origin, false)
     }
 
-    /// `scene` as it moves, about the world point `origin`; `eye` takes zero to where the camera is.
-    pub fn moving(scene: &'a Scene, origin: DVec3, eye: Pose) -> Self {
-        Self::build(scene, origin, eye, true)
+    /// `scene` as it moves, about the world point `origin`.
+    pub fn moving(scene: &'a Scene, origin: DVec3) -> Self {
+        Self::build(scene, origin, true)
     }
 
-    fn build(scene: &'a Scene, origin: DVec3, eye: Pose, moves: bool) -> Self {
+    fn build(scene: &'a Scene, origin: DVec3, moves: bool) -> Self {
         let (singles, arrays) = scene.objects.instances(moves);
         let aggregate = Aggregate::with_arrays(&singles, arrays, origin);
         let unknown = || (0..scene.objects.len()).map(|_| FoundOut::default()).collect();
-        Self { scene, aggregate, origin, eye, touching: unknown(), in_contact: unknown() }
+        Self { scene, aggregate, origin, touching: unknown(), in_contact: unknown() }
     }
 
     fn is_glass(&self, object: u32) -> bool {
         let has_interior =
             |id: &u32| id.checked_sub(1).is_some_and(|i| self.scene.materials[i as usize].has_interior());
         self.scene.objects.ids(object).material_ids.iter().any(has_interior)
-    }
-
-    /// Whether the media around the camera may change with time: it moves, or some glass does, and boxes of where they are
-    /// at all times meet.
-    pub fn is_eye_passing_glass(&self) -> bool {
-        if !self.scene.materials.iter().any(Material::has_interior) {
-            return false;
-        }
-        let eyes = self.eye.times().iter().map(|&time| self.eye.at(time)).chain([*self.eye.frame()]);
-        let path: Vec<_> = eyes.map(|eye| eye.translation - self.origin).collect();
-        self.aggregate.any_about(&path, self.eye.is_moving(), |object| self.is_glass(object))
-    }
-
-    /// The media around the camera at a time.
-    pub fn media_around_eye(&self, time: f64) -> MediaStack {
-        self.media_at(self.eye.at(time).translation - self.origin, time)
     }
 
     /// Whether the surface at `hit` can coincide with another object's glass (cemented lenses, liquid in its glass).

@@ -151,6 +151,13 @@ def _check_arrays(document, arrays):
                 if primvar.get("indices") is not None:
                     array(primvar["indices"], np.int32, 1, where)
                 assert primvar["interpolation"] in ("constant", "uniform", "varying", "vertex", "faceVarying")
+        motion = mesh.get("motion") or {"times": [], "points": []}
+        assert len(motion["points"]) == len(motion["times"]), where
+        assert motion["times"] == sorted(set(motion["times"])), f"{where}: {motion['times']}"
+        for names, like in ((motion["points"], mesh["points"]), (motion.get("normals", []), None)):
+            for name in names:
+                array(name, np.float32, 3, where)
+                assert like is None or arrays[name].shape == arrays[like].shape, where
         for name, primvar in mesh.get("primvars", {}).items():
             values = arrays[primvar["values"]]
             columns = 1 if values.ndim == 1 else values.shape[1]
@@ -185,6 +192,9 @@ def _check_arrays(document, arrays):
             shared.add(name)
             array(name, np.float64, 12, where)
             places = len(arrays[name])
+            for moved in (instances.get("places_motion") or {"transforms": []})["transforms"]:
+                array(moved, np.float64, 12, where)
+                assert len(arrays[moved]) == places, where
             if instances.get("indices") is None:
                 assert places == instances["count"], f"{where}: {places} transforms of {instances['count']} elements"
                 continue

@@ -19,6 +19,7 @@ def Sphere "Good"
 }
 def Camera "Shot"
 {
+ float2 clippingRange = (0.01, 1e30)
 }
 """
 TRIANGLE = {

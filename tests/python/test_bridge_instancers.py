@@ -323,16 +323,3 @@ def test_a_prototype_that_cannot_be_placed_is_left_out_with_its_instances(op, va
     (warning,) = warned(description, "broken-prim")
     assert warning["places"] == ["</P/A>"] and says in warning["message"]
     assert {path for path, *_ in unrolled(description)} == {"/P/B"}
-
-
-@pytest.mark.parametrize(("blur", "count"), [("", 1), ("uniform bool disableMotionBlur = true\n", 0)])
-def test_motion_is_warned_of_where_it_would_be_seen(blur, count):
-    camera = 'def Camera "C"\n{\n double shutter:open = -0.25\n double shutter:close = 0.25\n}\n'
-    settings = f'def RenderSettings "R"\n{{\n rel products = </R/P>\n def RenderProduct "P"\n {{\n  {blur} }}\n}}\n'
-    moving = INSTANCER.replace(
-        " def Sphere", " vector3f[] velocities = [(1, 0, 0), (0, 0, 0), (0, 0, 0)]\n def Sphere", 1
-    )
-    description = checked(in_memory(moving + camera + settings))
-    assert [warning["places"] for warning in warned(description, "motion-blur")] == [["</P>"]] * count
-    still = checked(in_memory(moving + camera.replace("0.25", "0") + settings))
-    assert not warned(still, "motion-blur") and not warned(checked(in_memory(moving)), "motion-blur")

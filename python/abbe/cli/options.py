@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from typing import Any, Literal
 
-from .._api import Options, Scene
+from .._api import Options, Scene, asks_for_motion
 from ..errors import NotUsdError, UsageError
 from . import messages
 
@@ -179,6 +179,11 @@ def add_request(parser: argparse.ArgumentParser) -> None:
         choices=("on", "off"),
         help="spread samples over the camera's lens, or not; as the stage says unless given",
     )
+    group.add_argument(
+        "--motion-blur",
+        choices=("on", "off"),
+        help="spread samples over the time that the shutter is open, or not; as the stage says unless given",
+    )
     group.add_argument("--integrator", metavar="NAME", help="what computes a pixel; `abbe aovs` lists them")
     group.add_argument(
         "--aov", action="append", metavar="NAME", help="an AOV to render, instead of the stage's; repeat for more"
@@ -225,7 +230,8 @@ def request(args: argparse.Namespace, from_stage: bool) -> Options:
         width=args.width,
         height=args.height,
         samples=args.samples,
-        depth_of_field=None if args.depth_of_field is None else args.depth_of_field == "on",
+        depth_of_field=_switch(args.depth_of_field),
+        motion_blur=_switch(args.motion_blur),
         integrator=args.integrator,
         aovs=args.aov,
         wavelength=args.wavelength,
@@ -242,6 +248,10 @@ def request(args: argparse.Namespace, from_stage: bool) -> Options:
         options["camera"] = args.camera
         options["product"] = args.product
     return options
+
+
+def _switch(text: str | None) -> bool | None:
+    return None if text is None else text == "on"
 
 
 def is_scene_file(args: argparse.Namespace) -> bool:
@@ -272,15 +282,22 @@ def frame(args: argparse.Namespace) -> float | Literal["default"] | None:
     return time
 
 
-def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None) -> Scene:
-    """Load the stage, or the scene file, at a time code."""
+def keep_open(args: argparse.Namespace) -> Any:
+    """Return the stage to be opened once for several time codes."""
+    from ..usd import keep_open
+
+    return keep_open(args.stage)
+
+
+def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None, kept: Any = None) -> Scene:
+    """Load the stage, or the scene file, at a time code; ``kept`` is the stage kept open for several."""
     messages.show_warnings(getattr(args, "quiet", False))
     if args.render_pass is not None and args.render_settings is not None:
         raise UsageError("--render-pass: it says which settings it renders: leave --render-settings out")
     if not is_scene_file(args):
         try:
             return Scene.from_stage(
-                args.stage,
+                args.stage if kept is None else kept,
                 frame=time,
                 camera=args.camera,
                 render_settings=args.render_settings,
@@ -294,6 +311,8 @@ def open_scene(args: argparse.Namespace, time: float | Literal["default"] | None
                 mask=args.mask,
                 payloads=args.payloads,
                 missing=args.missing,
+                motion_blur=_switch(getattr(args, "motion_blur", None)),
+                motion_vectors=asks_for_motion(args.aov) if hasattr(args, "aov") else True,
                 complexity=args.complexity,
                 scalar_ior=args.scalar_ior,
                 strict=args.strict,

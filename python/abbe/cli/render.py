@@ -173,8 +173,10 @@ def run(args: argparse.Namespace) -> int:
     if args.stats is not None:
         _check_output(args.stats, "--stats", ".json")
     try:
+        # The stage stays open between frames.
+        kept = None if len(times) == 1 or options.is_scene_file(args) else options.keep_open(args)
         for time in times:
-            _render_frame(args, time, outcome)
+            _render_frame(args, time, outcome, kept)
     except (AbbeError, OSError) as error:
         # With some frames written and others not, the output is partial, whatever went wrong.
         if not outcome.files:
@@ -188,8 +190,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _render_frame(args: argparse.Namespace, time: Time, outcome: _Outcome) -> None:
-    scene = options.open_scene(args, time)
+def _render_frame(args: argparse.Namespace, time: Time, outcome: _Outcome, kept: Any) -> None:
+    scene = options.open_scene(args, time, kept)
     request = options.request(args, from_stage=not options.is_scene_file(args))
     outputs = _outputs(scene, args, time, request)
     for output in outputs:

@@ -15,7 +15,7 @@ from .description import Description
 if TYPE_CHECKING:
     from .listing import CameraInfo, SettingsInfo
 
-__all__ = ["Description", "describe", "list_cameras", "list_settings"]
+__all__ = ["Description", "describe", "keep_open", "list_cameras", "list_settings"]
 
 
 def describe(
@@ -34,6 +34,8 @@ def describe(
     mask: Sequence[str] = (),
     payloads: str = "all",
     missing: str = "warn",
+    motion_blur: bool | None = None,
+    motion_vectors: bool | None = None,
     complexity: str | None = None,
     scalar_ior: str | None = None,
     strict: bool = False,
@@ -42,7 +44,8 @@ def describe(
 
     Parameters
     ----------
-    stage_or_path : path of a .usd, .usda, .usdc or .usdz file, or a ``pxr.Usd.Stage``, which is not changed
+    stage_or_path : path of a .usd, .usda, .usdc or .usdz file, or a ``pxr.Usd.Stage``, which is not changed, or what
+        :func:`keep_open` returned
     frame : time code; the stage's start if None; ``"default"`` reads default values instead of time samples
     camera : path of a Camera, or the name of the first; it then replaces the cameras that products name
     render_settings : path of a RenderSettings prim; the stage's own, or its only one, if None
@@ -56,6 +59,8 @@ def describe(
     mask : paths of the prims to load, with what they are bound to, connected to or show; everything if empty
     payloads : ``"all"`` or ``"none"``; a stage in memory keeps its own rules unless none are wanted
     missing : what to do where a layer, prim or texture that is referred to is missing: ``"warn"`` or ``"error"``
+    motion_blur : whether to read motion while shutters are open; as the stage's products say if None
+    motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
     complexity : ``"low"``, ``"medium"``, ``"high"`` or ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
         ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
     scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
@@ -94,12 +99,29 @@ def describe(
         mask=mask,
         payloads=payloads,
         missing=missing,
+        motion_blur=motion_blur,
+        motion_vectors=motion_vectors,
         complexity=complexity,
         strict=strict,
     )
     if scalar_ior is not None:
         description.document["settings"]["abbe"][tokens.SCALAR_IOR] = {"type": "token", "value": scalar_ior}
     return description
+
+
+def keep_open(path: str | os.PathLike[str]) -> Any:
+    """Return a stage file to :func:`describe` at several frames: it is opened once, its layers are read once.
+
+    Everything but the frame has to be asked for in the same way each time. The stage is closed when what was returned
+    is no longer in use.
+
+    Parameters
+    ----------
+    path : of a .usd, .usda, .usdc or .usdz file
+    """
+    from .stage import KeptStage
+
+    return KeptStage(path)
 
 
 def list_cameras(

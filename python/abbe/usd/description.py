@@ -67,6 +67,16 @@ class Diagnostics:
         if len(warning["places"]) < self.EXAMPLES and place not in warning["places"]:
             warning["places"].append(place)
 
+    def extend(self, other: Diagnostics) -> None:
+        """Record all that another has recorded."""
+        for key, warning in other._warnings.items():
+            own = self._warnings.setdefault(key, {**warning, "places": [], "count": 0})
+            own["count"] += warning["count"]
+            places = [place for place in warning["places"] if place not in own["places"]]
+            own["places"] += places[: self.EXAMPLES - len(own["places"])]
+        for reason, count in other.skipped.items():
+            self.skip(reason, count)
+
     def leave_out(self, broken: BrokenError) -> None:
         """Record that a prim is left out for what it says."""
         self.warn("broken-prim", broken.place, f"{broken.problem}; it is left out")

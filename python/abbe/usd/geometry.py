@@ -44,12 +44,23 @@ class ShapeReader:
         self._table = ArrayTable()
         self._subdivision = SubdivisionReader(self._ints, self._floats, self._table, diagnostics, time, level)
         self._index_by_prim: dict[Any, int | None] = {}
+        # Per shape: the prim that it was read from.
+        self._prims: list[Any] = []
         self.arrays = self._table.arrays
         self.shapes: list[dict[str, Any]] = []
         self.double_sided: list[bool] = []
         """Per shape: ``doubleSided`` of its prim."""
         self.subset_names: list[list[str]] = []
         """Per shape: the prim names of its subsets, in order: the same under every instance."""
+
+    def add(self, name: str, array: Array) -> str:
+        """Store an array and return its name."""
+        return self._table.add(name, array)
+
+    def meshes(self) -> list[tuple[Any, dict[str, Any]]]:
+        """Return the first prim of each mesh with its description."""
+        both = zip(self._prims, self.shapes, strict=True)
+        return [(prim, shape["mesh"]) for prim, shape in both if "mesh" in shape]
 
     def sphere(self, prim: Any, source: Any) -> int | None:
         """Return the index of the shape of a ``Sphere`` prim; prims with one ``source`` share it."""
@@ -89,6 +100,7 @@ class ShapeReader:
             self._index_by_prim[source] = None if shape is None else len(self.shapes)
             if shape is not None:
                 self.shapes.append(shape)
+                self._prims.append(prim)
                 self.double_sided.append(bool(read(prim, tokens.DOUBLE_SIDED, self._time)))
                 subsets = shape["mesh"]["subsets"] if "mesh" in shape else []
                 self.subset_names.append([subset["path"].rpartition("/")[2] for subset in subsets])

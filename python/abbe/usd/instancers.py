@@ -55,8 +55,8 @@ class InstancerReader:
         self._table = table
         self._shown: dict[Any, _Shown | None] = {}
         self._arrays: dict[Any, dict[int, tuple[str, str | None]]] = {}
-        self.moving: list[Any] = []
-        """Instancers with velocities, accelerations or angular velocities."""
+        self.prims: dict[Any, Any] = {}
+        """The first prim of each source."""
 
     def elements(self, prim: Any, source: Any, has_something: Callable[[Any], bool]) -> list[Elements]:
         """Return what an instancer shows, by prototype in the order of its ``prototypes``.
@@ -68,6 +68,7 @@ class InstancerReader:
         has_something : called with the prototype's root prim, whether anything of it is rendered; transforms of others
             are not computed
         """
+        self.prims.setdefault(source, prim)
         shown = self._shown[source] if source in self._shown else self._shown.setdefault(source, self._read(prim))
         if shown is None:
             return []
@@ -108,8 +109,6 @@ class InstancerReader:
             self._fits(prim, name, count)
         if _LACKS_ORIENTATIONS_F and prim.HasAttribute(tokens.ORIENTATIONS_F):
             self._warn(prim, tokens.ORIENTATIONS_F, "is newer than this USD, which ignores it: author orientations too")
-        if any(prim.GetAttribute(name) and prim.GetAttribute(name).HasAuthoredValue() for name in tokens.MOTION_NAMES):
-            self.moving.append(prim)
         mask = self._mask(prim, count)
         valid = (prototypes >= 0) & (prototypes < known)
         if not valid.all():
@@ -163,37 +162,73 @@ class InstancerReader:
         self, prim: Any, shown: _Shown, targets: dict[int, Any], arrays: dict[int, tuple[str, str | None]]
     ) -> None:
         """Compute the transforms of the elements of some prototypes."""
-        instancer = UsdGeom.PointInstancer
-        # Prototypes' own transforms come in below: USD has no transform at all if one prototype is missing.
-        value = instancer(prim).ComputeInstanceTransformsAtTime(
-            self._time, self._time, instancer.ExcludeProtoXform, instancer.IgnoreMask
-        )
-        if len(value) != shown.total:
+        transforms = self._computed(prim, shown, self._time, self._time)
+        if transforms is None:
             self._warn(prim, tokens.POSITIONS, "USD computes no transforms from its arrays; nothing is instanced")
             return
-        transforms = np.asarray(value)
         for index, target in targets.items():
             chosen = shown.elements[index]
             rows = _affine(transforms, chosen)
             try:
-                own = self._own_transform(prim.GetStage().GetPrimAtPath(target))
+                own = self._own_transform(prim.GetStage().GetPrimAtPath(target), self._time)
             except BrokenError as broken:
                 self._diagnostics.leave_out(broken)
                 continue
-            if own is not None:
-                with np.errstate(over="ignore", invalid="ignore"):  # the core leaves out what is not finite
-                    rows = own @ rows
+            rows = _within(own, rows)
             name = f"instances{len(self._table.arrays)}"
             names = self._table.add(f"{name}.transforms", _frozen(rows.reshape(-1, 12)))
             arrays[index] = (names, None if chosen is None else self._table.add(f"{name}.indices", _frozen(chosen)))
 
-    def _own_transform(self, root: Any) -> Array | None:
+    @staticmethod
+    def _computed(prim: Any, shown: _Shown, time: Any, base: Any) -> Array | None:
+        """Return the matrices of all elements at a time, as those at the time ``base`` move; None if USD has none."""
+        instancer = UsdGeom.PointInstancer
+        # Prototypes' own transforms come in elsewhere: USD has no transform at all if one prototype is missing.
+        value = instancer(prim).ComputeInstanceTransformsAtTime(
+            time, base, instancer.ExcludeProtoXform, instancer.IgnoreMask
+        )
+        return np.asarray(value) if len(value) == shown.total else None
+
+    def array_names(self, source: Any) -> list[str]:
+        """Return the names of the arrays of transforms of an instancer that was read."""
+        return [transforms for transforms, _ in self._arrays.get(source, {}).values()]
+
+    def roots(self, source: Any) -> list[Any]:
+        """Return the root prims of the prototypes that an instancer shows, in the order of their arrays."""
+        prim = self.prims[source]
+        targets = prim.GetRelationship(tokens.PROTOTYPES).GetForwardedTargets()
+        return [prim.GetStage().GetPrimAtPath(targets[index]) for index in self._arrays.get(source, {})]
+
+    def transforms_at(self, source: Any, time: Any, base: Any) -> dict[str, Array] | None:
+        """Return the transforms at another time, by the name of the array at the frame; None if USD has none."""
+        shown = self._shown.get(source)
+        transforms = None if shown is None else self._computed(self.prims[source], shown, time, base)
+        if shown is None or transforms is None:
+            return None
+        found: dict[str, Array] = {}
+        for (index, (name, _)), root in zip(self._arrays[source].items(), self.roots(source), strict=True):
+            try:
+                own = self._own_transform(root, time)
+            except BrokenError:
+                return None
+            found[name] = _within(own, _affine(transforms, shown.elements[index])).reshape(-1, 12)
+        return found
+
+    def array(self, name: str) -> Array:
+        """Return an array that was read."""
+        return self._table.arrays[name]
+
+    def add(self, name: str, array: Array) -> str:
+        """Store an array and return its name."""
+        return self._table.add(name, _frozen(array))
+
+    def _own_transform(self, root: Any, time: Any) -> Array | None:
         """Return the transform of a prototype's root prim; None for the identity."""
         xformable = UsdGeom.Xformable(root)
         if not xformable:
             return None
         try:
-            numbers = matrix(xformable.GetLocalTransformation(self._time))
+            numbers = matrix(xformable.GetLocalTransformation(time))
         except Tf.ErrorException as error:
             raise BrokenError(place(root), f"USD cannot read its transform ({usd_reason(error)})") from None
         own = np.array(numbers).reshape(4, 4)
@@ -217,6 +252,15 @@ def _affine(transforms: Array, chosen: Array | None) -> Array:
     for first in range(0, len(rows), _ROWS):
         copy[first : first + _ROWS] = rows[first : first + _ROWS, :3]
     return copy.reshape(-1, 4, 3)
+
+
+def _within(own: Array | None, rows: Array) -> Array:
+    """Return the transforms of what stands at ``own`` within places."""
+    if own is None:
+        return rows
+    with np.errstate(over="ignore", invalid="ignore"):  # the core leaves out what is not finite
+        placed: Array = own @ rows
+    return placed
 
 
 def _length(value: Any) -> int:

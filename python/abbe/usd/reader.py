@@ -7,7 +7,7 @@ in a warning with its prim path; what was not asked for is counted.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Unpack
 
@@ -28,11 +28,12 @@ from .lights import LightReader, is_light
 from .links import link_lights
 from .materials import MaterialReader
 from .metadata import stage_metadata, stage_time
+from .motion import MotionReader, motion_span
 from .passes import ActivePass, Appearance, find_pass
 from .places import Places
 from .primvars import PrimvarReader
 from .render import binding_purposes, find_settings, read_settings, rendered_purposes
-from .stage import OpenedStage, Opening, open_stage, source_name
+from .stage import KeptStage, OpenedStage, Opening, open_stage, source_name
 from .subdivision import refinement_level
 from .values import IDENTITY, is_finite, place, read
 
@@ -89,6 +90,8 @@ class _Group:
     """The prototype's root prim, whose own transform is that of the instances; None for the stage."""
     placed: list[_Placed] = field(default_factory=list)
     instances: list[dict[str, Any]] = field(default_factory=list)
+    instancers: list[tuple[Any, Any]] = field(default_factory=list)
+    """The prims that these are of, and what they share with other native instances."""
     lights: list[_Light] = field(default_factory=list)
 
 
@@ -206,6 +209,7 @@ class _Walk:
             if transform != IDENTITY:
                 item["transform"] = transform
             group.instances.append(item)
+            group.instancers.append((prim, source))
 
     def _prototype(self, root: Any, instancer: Any, state: _State) -> int | None:
         """Return the group of a prototype; None with a warning where it contains the instancer.
@@ -418,6 +422,23 @@ class _Walk:
                 groups[-1]["instances"] = group.instances
         return groups
 
+    def add_motion(self, reader: MotionReader, cameras: Iterable[tuple[Any, dict[str, Any]]]) -> None:
+        """Add to everything that was read where it is at other times."""
+        for prim, mesh in self.shapes.meshes():
+            reader.points(prim, mesh, self.shapes)
+        places: dict[Any, dict[str, dict[str, Any]]] = {}
+        for group in self.groups:
+            moving = [(placed.prim, placed.item) for placed in group.placed]
+            moving += [(prim, item) for (prim, _), item in zip(group.instancers, group.instances, strict=True)]
+            for prim, item in moving:
+                _add(item, "motion", reader.transform(prim, group.root))
+            for (_, source), item in zip(group.instancers, group.instances, strict=True):
+                if source not in places:
+                    places[source] = reader.instances(source, self.instancers)
+                _add(item, "places_motion", places[source].get(item["transforms"]))
+        for prim, camera in cameras:
+            _add(camera, "motion", reader.transform(prim))
+
     def shine(self, reader: LightReader, groups: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """Add lights to the groups, which are bound, and return the sets that they are linked to."""
         lights = []
@@ -484,6 +505,11 @@ class _Walk:
         return None if box.IsEmpty() else _finite_box(list(box.GetMin()), list(box.GetMax()))
 
 
+def _add(item: dict[str, Any], name: str, value: Any) -> None:
+    if value is not None:
+        item[name] = value
+
+
 def _finite_box(low: list[float], high: list[float]) -> tuple[list[float], list[float]] | None:
     return (low, high) if is_finite([*low, *high]) else None
 
@@ -498,6 +524,8 @@ def read_stage(
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
+    motion_blur: bool | None,
+    motion_vectors: bool | None,
     complexity: str | None,
     strict: bool,
     **opening: Unpack[Opening],
@@ -513,7 +541,10 @@ def read_stage(
     with quiet_usd(source, diagnostics):
         # A mask keeps the camera and the settings that were asked for by path.
         also = [path for path in (camera, render_settings, render_pass, product) if path and path.startswith("/")]
-        opened = open_stage(stage_or_path, also=also, diagnostics=diagnostics, **opening)
+        if isinstance(stage_or_path, KeptStage):
+            opened = stage_or_path.open(also, diagnostics, opening)
+        else:
+            opened = open_stage(stage_or_path, also=also, diagnostics=diagnostics, **opening)
         return _read(
             opened,
             diagnostics,
@@ -524,6 +555,8 @@ def read_stage(
             product,
             purposes,
             missing,
+            motion_blur,
+            motion_vectors,
             complexity,
             strict,
         )
@@ -539,6 +572,8 @@ def _read(
     product: str | None,
     purposes: Sequence[str] | None,
     missing: str,
+    motion_blur: bool | None,
+    motion_vectors: bool | None,
     complexity: str | None,
     strict: bool,
 ) -> Description:
@@ -575,7 +610,10 @@ def _read(
     settings = read_settings(
         stage, settings_prim, time, time_code or 0.0, product, camera_index, bool(camera), source, diagnostics
     )
-    _warn_of_motion(walk.instancers.moving, cameras, settings, diagnostics)
+    span = motion_span(stage, time, cameras, settings, motion_blur, motion_vectors)
+    if span is not None:
+        metadata["motion"] = [span.marks[0], span.marks[-1]]
+        walk.add_motion(MotionReader(span, diagnostics), zip(index_by_camera, cameras, strict=False))
     if not any(group["items"] for group in groups):
         diagnostics.warn("nothing-to-render", source, "the stage has no geometry to render: every ray misses")
 
@@ -596,22 +634,6 @@ def _read(
         "strict_assets": missing == "error",
     }
     return Description(document, {**walk.arrays(), **assets.arrays})
-
-
-def _warn_of_motion(
-    instancers: list[Any], cameras: list[dict[str, Any]], settings: dict[str, Any], diagnostics: Diagnostics
-) -> None:
-    """Warn of instancers that move where a camera's shutter is open for a while and blur is not turned off."""
-    base = settings.get("base")
-    products = settings["products"] or ([base] if base else [])
-    is_off = bool(products) and all(product["disable_motion_blur"] for product in products)
-    # A camera that frames the stage has no shutter.
-    if is_off or not any(c.get("shutter_close", 0.0) > c.get("shutter_open", 0.0) for c in cameras):
-        return
-    for prim in instancers:
-        diagnostics.warn(
-            "motion-blur", place(prim), "its instances move; they are rendered where they are at the frame"
-        )
 
 
 def _framed(walk: _Walk, up_axis: str, source: str, strict: bool, diagnostics: Diagnostics) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from .mtlx import read_document
 from .overrides import Overrides, select_variant, set_value, split_override
 from .substitution import substitute
 
-__all__ = ["OpenedStage", "Opening", "open_stage", "source_name"]
+__all__ = ["KeptStage", "OpenedStage", "Opening", "open_stage", "source_name"]
 
 
 @dataclass
@@ -47,6 +47,28 @@ class Opening(TypedDict, total=False):
     session_layer: str | os.PathLike[str] | None
     mask: Sequence[str]
     payloads: str
+
+
+class KeptStage:
+    """A stage file that is opened when it is first described, and stays open for the frames after it.
+
+    Every description of it is asked for with the same options but for the frame.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = path
+        self._opened: OpenedStage | None = None
+        self._told = Diagnostics()
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+    def open(self, also: Sequence[str], diagnostics: Diagnostics, opening: Opening) -> OpenedStage:
+        """Return the stage, and tell again what was told when it was opened."""
+        if self._opened is None:
+            self._opened = open_stage(self.path, also=also, diagnostics=self._told, **opening)
+        diagnostics.extend(self._told)
+        return self._opened
 
 
 def source_name(stage_or_path: Any) -> str:

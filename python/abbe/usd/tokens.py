@@ -41,7 +41,12 @@ ORIENTATIONS: Final = "orientations"
 ORIENTATIONS_F: Final = "orientationsf"
 SCALES: Final = "scales"
 IDS: Final = "ids"
-MOTION_NAMES: Final = ("velocities", "accelerations", "angularVelocities")
+VELOCITIES: Final = "velocities"
+ACCELERATIONS: Final = "accelerations"
+MOTION_NAMES: Final = (VELOCITIES, ACCELERATIONS, "angularVelocities")
+INSTANCE_TRANSFORMS: Final = (POSITIONS, ORIENTATIONS, ORIENTATIONS_F, SCALES)
+# The sources of render variables that tell of motion; `motionvector` is what other renderers call the first.
+MOTION_SOURCES: Final = ("motion", "refracted_motion", "motionvector")
 
 # Sphere, Cube, Plane, Cylinder, Cone, Capsule.
 RADIUS: Final = "radius"

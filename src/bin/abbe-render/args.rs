@@ -24,6 +24,7 @@ What is not given, the scene's render settings decide.
   --aov NAME               an AOV to render, instead of the scene's; repeat for more
   --wavelength NM          reference wavelength
   --band LO:HI             wavelength band of footprints, nm
+  --motion-blur on|off     spread samples over the shutter, or not; as the scene says unless given
   --dispersion-scale S     multiplies all dispersion: 0 none, 1 physical
   --seed N                 same seed, same bits
   --threads N              all of the machine's unless given; never changes a bit
@@ -84,13 +85,8 @@ fn read(mut parser: lexopt::Parser) -> Result<Command> {
             "width" => request.width = Some(number(&mut parser, &option)?),
             "height" => request.height = Some(number(&mut parser, &option)?),
             "samples" => request.samples = Some(number(&mut parser, &option)?),
-            "depth-of-field" => {
-                request.depth_of_field = Some(match text(&mut parser, &option)?.as_str() {
-                    "on" => true,
-                    "off" => false,
-                    other => return Err(Error::usage("--depth-of-field", format!("'{other}' is neither on nor off"))),
-                });
-            }
+            "depth-of-field" => request.depth_of_field = Some(on_or_off(&mut parser, &option)?),
+            "motion-blur" => request.motion_blur = Some(on_or_off(&mut parser, &option)?),
             "integrator" => request.integrator = Some(text(&mut parser, &option)?),
             "aov" => request.aovs.get_or_insert_default().push(text(&mut parser, &option)?),
             "wavelength" => request.wavelength = Some(number(&mut parser, &option)?),
@@ -129,6 +125,14 @@ fn text(parser: &mut lexopt::Parser, option: &str) -> Result<String> {
         .map_err(wrong)?
         .into_string()
         .map_err(|value| Error::usage(format!("--{option}"), format!("{} is not UTF-8", value.display())))
+}
+
+fn on_or_off(parser: &mut lexopt::Parser, option: &str) -> Result<bool> {
+    match text(parser, option)?.as_str() {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        other => Err(Error::usage(format!("--{option}"), format!("'{other}' is neither on nor off"))),
+    }
 }
 
 fn number<T: FromStr>(parser: &mut lexopt::Parser, option: &str) -> Result<T> {
