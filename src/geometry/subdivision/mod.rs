@@ -18,6 +18,7 @@ mod tangents;
 mod topology;
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "what stays has the same bits")]
 mod tests;
 
 pub(super) use refined::Refined;
