@@ -81,12 +81,13 @@ def test_vectors_lead_to_where_the_next_frame_shows_the_same_point(stage: Path) 
         back = np.array([[np.cos(turn), 0, -np.sin(turn)], [0, 1, 0], [np.sin(turn), 0, np.cos(turn)]])
         return offset @ back.T
 
-    rows, columns = np.nonzero(now["prim_id"] == 1)
+    shown, shown_then = now["prim_id"].reshape(240, 360), then["prim_id"].reshape(240, 360)
+    rows, columns = np.nonzero(shown == 1)
     checked = 0
     for row, column in list(zip(rows, columns, strict=True))[::97]:
         x, y = column + motion[row, column, 0], row - motion[row, column, 1]
         x0, y0 = int(np.floor(x)), int(np.floor(y))
-        if not (0 <= x0 < 359 and 0 <= y0 < 239) or (then["prim_id"][y0 : y0 + 2, x0 : x0 + 2] != 1).any():
+        if not (0 <= x0 < 359 and 0 <= y0 < 239) or (shown_then[y0 : y0 + 2, x0 : x0 + 2] != 1).any():
             continue
         wx, wy = x - x0, y - y0
         corners = in_box(position[y0 : y0 + 2, x0 : x0 + 2].reshape(-1, 3), 2)
