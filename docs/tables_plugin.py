@@ -29,7 +29,13 @@ def tables() -> dict[str, str]:
         ],
         "| validator | what it makes sure of |": [f"| `{v.name}` | {v.doc} |" for v in VALIDATORS],
     }
-    for name in ("AbbeDispersionAPI", "AbbeLightAPI", "AbbeRenderSettingsAPI", "AbbeRenderVarAPI"):
+    for name in (
+        "AbbeDispersionAPI",
+        "AbbeSubdivisionAPI",
+        "AbbeLightAPI",
+        "AbbeRenderSettingsAPI",
+        "AbbeRenderVarAPI",
+    ):
         schema = schemas.GetPrimAtPath(f"/{name}")
         found[f"| `{name}` | type | default | |"] = [_row(item, item.name) for item in schema.attributes]
     return {head: "\n".join(rows) for head, rows in found.items()}

@@ -194,7 +194,7 @@ class Scene:
         motion_blur : whether to read motion while shutters are open; as the stage's products say if None
         motion_vectors : read motion up to the next frame; where the RenderVars ask for it if None
         complexity : ``"low"``, ``"medium"``, ``"high"``, ``"veryhigh"``: subdivision surfaces are divided 0 to 3 times;
-            ``abbe:subdivision:level`` of a mesh counts first; 2 if None, 1 for very fine ones
+            ``abbe:subdivision:level`` of a mesh counts first; by its size if None, 2 for most
         scalar_ior : of an index without dispersion: ``"constant"`` or ``"nearest-glass"``; the settings' if None
         strict : a stage without a camera is an error
 

@@ -170,7 +170,7 @@ impl Compiler<'_> {
         let mut list = vec![material_of(placement.material)];
         list.extend(placement.subset_materials.iter().map(|m| material_of(m.or(placement.material))));
         list.resize(1 + report.subsets, list[0]);
-        if !report.is_closed && list.iter().any(|&id| id > 0 && self.materials[id as usize - 1].has_interior()) {
+        if !report.is_closed && list.iter().any(|&id| id > 0 && self.materials[id as usize - 1].is_glass_all_over()) {
             diagnostics.warn(
                 "open-glass-mesh",
                 &placement.path,

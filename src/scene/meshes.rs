@@ -72,6 +72,10 @@ pub(super) fn report(mesh: &description::Mesh, report: &MeshReport, diagnostics:
         let place = format!("{}.{}", mesh.path, problem.attribute);
         diagnostics.warn("unusable-attribute", place, problem.problem.as_str());
     }
+    if report.faces_in_several_subsets > 0 {
+        let problem = format!("{} faces are in several subsets; the first has them", report.faces_in_several_subsets);
+        diagnostics.warn("overlapping-subsets", &mesh.path, problem);
+    }
     if report.degenerate > 0 {
         diagnostics.warn(
             "degenerate-faces",

@@ -91,17 +91,17 @@ impl ColorSpace {
             | "linear rec.709 (srgb)"
             | "utility - linear - srgb"
             | "utility - linear - rec.709" => (Linear, REC709),
-            "g18_rec709" => (Gamma(1.8), REC709),
-            "g22_rec709" => (Gamma(2.2), REC709),
-            "g24_rec709" | "rec709_display" => (Gamma(2.4), REC709),
+            "g18_rec709" | "gamma 1.8 rec.709 - texture" => (Gamma(1.8), REC709),
+            "g22_rec709" | "gamma 2.2 rec.709 - texture" => (Gamma(2.2), REC709),
+            "g24_rec709" | "rec709_display" | "gamma 2.4 rec.709 - texture" => (Gamma(2.4), REC709),
             "acescg" | "lin_ap1" | "aces - acescg" => (Linear, AP1),
-            "g22_ap1" => (Gamma(2.2), AP1),
-            "srgb_ap1" => (Srgb, AP1),
+            "g22_ap1" | "gamma 2.2 ap1 - texture" => (Gamma(2.2), AP1),
+            "srgb_ap1" | "srgb encoded ap1 - texture" => (Srgb, AP1),
             "aces2065-1" | "aces2065_1" | "lin_ap0" | "aces - aces2065-1" => (Linear, AP0),
-            "lin_p3d65" | "lin_displayp3" => (Linear, P3),
+            "lin_p3d65" | "lin_displayp3" | "linear p3-d65" => (Linear, P3),
             "srgb_p3d65" | "srgb_displayp3" => (Srgb, P3),
-            "lin_rec2020" => (Linear, REC2020),
-            "lin_adobergb" => (Linear, ADOBE_RGB),
+            "lin_rec2020" | "linear rec.2020" => (Linear, REC2020),
+            "lin_adobergb" | "linear adobergb" => (Linear, ADOBE_RGB),
             "adobergb" | "g22_adobergb" => (Gamma(ADOBE_GAMMA), ADOBE_RGB),
             "lin_ciexyzd65" => {
                 return Some(Self { transfer: Linear, to_rec709: Some(rows(xyz_from(REC709).inverse())) });
@@ -147,7 +147,7 @@ fn xyz_from([r, g, b, white]: Chromaticities) -> DMat3 {
 }
 
 fn bradford(from: [f64; 2], to: [f64; 2]) -> DMat3 {
-    if from == to {
+    if from.map(f64::to_bits) == to.map(f64::to_bits) {
         return DMat3::IDENTITY;
     }
     let cone = DMat3::from_cols(

@@ -61,6 +61,7 @@ SCHEMAS = {
             "abbe:lens:back:semiDiameter": ("double", VARYING, 0.0, None),
         },
     ),
+    "AbbeSubdivisionAPI": ("Mesh", {"abbe:subdivision:level": ("int", UNIFORM, -1, None)}),
     "AbbeLightAPI": (
         "DomeLight",
         {
@@ -74,7 +75,6 @@ SCHEMAS = {
             "abbe:lightGroup": ("string", UNIFORM, "", None),
         },
     ),
-    "AbbeSubdivisionAPI": ("Mesh", {"abbe:subdivision:level": ("int", UNIFORM, 2, None)}),
     "AbbeRenderSettingsAPI": (
         "RenderSettings",
         {

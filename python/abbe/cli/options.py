@@ -136,7 +136,7 @@ def add_stage(parser: argparse.ArgumentParser, time: bool = True, scene_file: bo
         "--complexity",
         "-c",
         choices=("low", "medium", "high", "veryhigh"),
-        help="divide subdivision surfaces 0, 1, 2 or 3 times; 2 unless given, less for very fine ones",
+        help="divide subdivision surfaces 0, 1, 2 or 3 times; unless given by their size, 2 for most",
     )
 
 

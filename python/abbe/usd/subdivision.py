@@ -88,10 +88,10 @@ class SubdivisionReader:
         if not attribute or not attribute.HasAuthoredValue():
             return self._level
         level = read(prim, tokens.SUBDIVISION_LEVEL, self._time)
-        if isinstance(level, bool) or not isinstance(level, int) or level < 0:
+        if isinstance(level, bool) or not isinstance(level, int):
             self._warn(prim, tokens.SUBDIVISION_LEVEL, f"{level} is no number of levels; it is left out")
             return self._level
-        return level
+        return self._level if level < 0 else level
 
     def _add(self, result: dict[str, Any], key: str, array_name: str, values: Any) -> None:
         if values is not None and len(values):

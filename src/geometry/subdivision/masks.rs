@@ -136,7 +136,8 @@ fn edge_point<const N: usize>(
     let smooth = match masks {
         Masks::Loop => {
             // The corner before the owner of the edge is the one across it.
-            let across = |c: usize| &values[level.corner_vertex[if c % 3 == 0 { c + 2 } else { c - 1 }] as usize];
+            let across =
+                |c: usize| &values[level.corner_vertex[if c.is_multiple_of(3) { c + 2 } else { c - 1 }] as usize];
             combine([(0.375, a), (0.375, b), (0.125, across(c)), (0.125, across(d))])
         }
         _ => {

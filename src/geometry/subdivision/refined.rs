@@ -1,5 +1,7 @@
 //! A subdivision surface as polygons on its limit surface, with everything that the control mesh carries.
 
+use rayon::prelude::*;
+
 use super::super::motion::Deformation;
 use super::super::{Buffer, Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
 use super::{Refiner, Surface};
@@ -148,7 +150,7 @@ fn equal_values<const N: usize>(values: &[[f64; N]]) -> Vec<u32> {
     // Adding 0 turns −0 into 0.
     let key = |i: u32| values[i as usize].map(|x| (x + 0.0).to_bits());
     let mut order: Vec<u32> = (0..values.len() as u32).collect();
-    order.sort_unstable_by_key(|&i| (key(i), i));
+    order.par_sort_unstable_by_key(|&i| (key(i), i));
     let mut first = vec![0; values.len()];
     for group in order.chunk_by(|&a, &b| key(a) == key(b)) {
         group.iter().for_each(|&i| first[i as usize] = group[0]);

@@ -6,7 +6,9 @@
 //! Kass, DeRose 1993; Biermann, Levin, Zorin 2000, "Piecewise smooth subdivision surfaces with normal control").
 //!
 //! One deviation: the tangent across a crease that Biermann et al. print, and OpenSubdiv with them, belongs to their
-//! modified rules; under the rules in use it is no eigenvector unless the crease is regular. Here it is.
+//! modified rules; under the rules in use it is no eigenvector unless the crease is regular. Here it is. (With many faces on
+//! one side, five and more for Catmull–Clark, those rules leave no single tangent plane: what is nearest to the crease has the
+//! one that is given.)
 
 use std::f64::consts::{PI, TAU};
 

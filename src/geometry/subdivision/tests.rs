@@ -429,3 +429,172 @@ fn limits_do_not_depend_on_the_level() {
         }
     }
 }
+
+/// Refined face-varying values of a flat grid with a value for each corner.
+fn refine_values(
+    cage: &Cage,
+    level: u32,
+    rule: FaceVaryingInterpolation,
+    index_of: impl Fn(usize) -> u32 + Sync,
+    values: &[[f64; 2]],
+) -> (Vec<[f64; 2]>, Refiner) {
+    let refiner = cage.with(level, |polygons, subdivision| {
+        let subdivision = Subdivision { face_varying: rule, ..subdivision.clone() };
+        Refiner::new(polygons, &subdivision, &mut Vec::new()).expect("levels")
+    });
+    let refined = refiner.face_varying(index_of, values);
+    let by_corner = (0..refiner.corner_points().len())
+        .map(|corner| {
+            let index = refined.indices.as_ref().map_or(refiner.corner_points()[corner] as i32, |i| i[corner]);
+            refined.values[index as usize]
+        })
+        .collect();
+    (by_corner, refiner)
+}
+
+#[test]
+fn values_without_seams_follow_the_rules_of_points() {
+    use FaceVaryingInterpolation as Rule;
+    for cage in [cube(), house(), octahedron(), Cage { creases: vec![([4, 5], 1.5), ([5, 7], 10.0)], ..cube() }] {
+        let corners: Vec<i32> = cage.faces.concat();
+        let values: Vec<[f64; 2]> = cage.points.iter().map(|p| [p[0].into(), p[2].into()]).collect();
+        let (limits, ..) = cage.limit(2);
+        for rule in [Rule::None, Rule::CornersOnly, Rule::CornersPlus1, Rule::CornersPlus2, Rule::Boundaries] {
+            // A closed mesh has no boundary to be different at.
+            let (refined, refiner) = refine_values(&cage, 2, rule, |corner| corners[corner] as u32, &values);
+            for (value, &point) in refined.iter().zip(refiner.corner_points()) {
+                let p = limits[point as usize];
+                assert!((value[0] - p.x).abs() < 1e-14 && (value[1] - p.z).abs() < 1e-14, "{rule:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn linear_values_are_bilinear_in_every_face() {
+    let cage = house();
+    let corners: Vec<i32> = cage.faces.concat();
+    let values: Vec<[f64; 2]> = cage.points.iter().map(|p| [p[0].into(), p[1].into()]).collect();
+    let (refined, refiner) =
+        refine_values(&cage, 1, FaceVaryingInterpolation::All, |corner| corners[corner] as u32, &values);
+    let parents: Vec<u32> = refiner.authored_faces().collect();
+    for (face, quad) in refined.chunks_exact(4).enumerate() {
+        let points = &cage.faces[parents[face] as usize];
+        let mean = |k: usize| points.iter().map(|&p| values[p as usize][k]).sum::<f64>() / points.len() as f64;
+        assert!((0..2).all(|k| (quad[2][k] - mean(k)).abs() < 1e-15), "the middle of the face");
+        let at = |q: [f64; 2]| values.iter().position(|&v| v == q).expect("a control value stays") as i32;
+        let here = points.iter().position(|&p| p == at(quad[0])).expect("of this face");
+        let next = values[points[(here + 1) % points.len()] as usize];
+        assert!((0..2).all(|k| (quad[1][k] - 0.5 * (quad[0][k] + next[k])).abs() < 1e-15), "the middle of the edge");
+    }
+}
+
+#[test]
+fn seams_are_boundaries_of_the_values() {
+    use FaceVaryingInterpolation as Rule;
+    // A plane of 4 × 4 quads; values are positions, but the right half is shifted: a seam along x = 2. The borders of the
+    // left region bend at (2, 2), where its value is moved by 0.6.
+    let cage = grid(4, |_, _| 0.0, false);
+    let corners: Vec<i32> = cage.faces.concat();
+    let points = cage.points.len() as u32;
+    let index_of = |corner: usize| {
+        let right = corner / 4 % 4 >= 2;
+        corners[corner] as u32 + if right { points } else { 0 }
+    };
+    let mut values: Vec<[f64; 2]> = cage.points.iter().map(|p| [p[0].into(), p[1].into()]).collect();
+    values.extend(cage.points.iter().map(|p| [f64::from(p[0]) + 7.0, p[1].into()]));
+    let centre = 2 * 5 + 2;
+    values[centre][0] += 0.6;
+    for (rule, moved, corner) in [
+        // The seam is a cubic B-spline: 2/3 of the move is left at the knot; corners are rounded.
+        (Rule::None, 0.4, false),
+        (Rule::CornersOnly, 0.4, true),
+        (Rule::CornersPlus1, 0.4, true),
+        (Rule::CornersPlus2, 0.4, true),
+        (Rule::Boundaries, 0.6, true),
+        (Rule::All, 0.6, true),
+    ] {
+        let (refined, refiner) = refine_values(&cage, 2, rule, index_of, &values);
+        let of = |face: u32, point: u32| {
+            let parents: Vec<u32> = refiner.authored_faces().collect();
+            (0..refined.len())
+                .find(|&c| parents[c / 4] == face && refiner.corner_points()[c] == point)
+                .map(|c| refined[c])
+                .expect("a corner of the face")
+        };
+        let left = of(5, centre as u32);
+        assert!((left[0] - 2.0 - moved).abs() < 1e-14 && (left[1] - 2.0).abs() < 1e-14, "{rule:?}: {left:?}");
+        let right = of(6, centre as u32);
+        assert!((right[0] - 9.0).abs() < 1e-14 && (right[1] - 2.0).abs() < 1e-14, "{rule:?}: {right:?}");
+        let first = of(0, 0);
+        let expected = if corner { 0.0 } else { 1.0 / 6.0 };
+        assert!((first[0] - expected).abs() < 1e-14 && (first[1] - expected).abs() < 1e-14, "{rule:?}: {first:?}");
+    }
+    // Three values at one vertex: smooth seams until cornersPlus1.
+    let three = |corner: usize| {
+        let face = corner / 4;
+        corners[corner] as u32 + points * u32::from(face % 4 >= 2) + 2 * points * u32::from(face >= 8 && face % 4 >= 2)
+    };
+    values.truncate(points as usize);
+    values[centre][0] -= 0.6;
+    let all: Vec<[f64; 2]> =
+        (0..4).flat_map(|k| values.iter().map(move |v| [v[0] + 10.0 * f64::from(k), v[1]])).collect();
+    let mut bent = all.clone();
+    bent[centre][0] += 0.6;
+    for (rule, moved) in [(Rule::CornersOnly, 0.4), (Rule::CornersPlus1, 0.6), (Rule::CornersPlus2, 0.6)] {
+        let (refined, refiner) = refine_values(&cage, 1, rule, three, &bent);
+        let corner = (0..refined.len())
+            .find(|&c| refiner.corner_points()[c] == centre as u32 && refined[c][0] < 5.0)
+            .expect("the left region");
+        assert!((refined[corner][0] - 2.0 - moved).abs() < 1e-14, "{rule:?}: {:?}", refined[corner]);
+    }
+}
+
+#[test]
+fn boundaries_that_are_not_interpolated_and_holes_only_support_others() {
+    let cage = Cage { boundary: BoundaryInterpolation::None, ..grid(4, |_, _| 0.0, false) };
+    let refiner = cage.refiner(1);
+    let hidden: Vec<u32> = (0..16).filter(|&face| refiner.is_hole(face)).collect();
+    assert_eq!(hidden, [0, 1, 2, 3, 4, 7, 8, 11, 12, 13, 14, 15], "all but the four in the middle");
+    // A boundary that is creased for ever is one.
+    let rim = [0, 1, 2, 3, 4, 9, 14, 19, 24, 23, 22, 21, 20, 15, 10, 5, 0];
+    let creases = rim.windows(2).map(|w| ([w[0], w[1]], 10.0)).collect();
+    assert!(Cage { creases, ..cage }.refiner(1).holes().is_empty());
+}
+
+#[test]
+fn what_is_no_manifold_stays_where_it_is() {
+    // Three faces at one edge, a vertex that joins two fans, a face that uses a vertex twice, a face of two corners.
+    let points = vec![
+        [0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [-1.0, 0.0, 0.5],
+        [-1.0, 1.0, 0.5],
+        [0.0, 0.0, 1.0],
+        [0.0, 1.0, 1.0],
+        [2.0, 2.0, 0.0],
+        [1.0, 2.0, 0.0],
+    ]; // fmt: skip
+    let faces = vec![
+        vec![0, 2, 3, 1],
+        vec![1, 5, 4, 0],
+        vec![0, 6, 7, 1],
+        vec![3, 8, 9],
+        vec![8, 9, 8, 2],
+        vec![4, 4, 5],
+        vec![6, 7],
+    ]; // fmt: skip
+    for scheme in [Scheme::CatmullClark, Scheme::Bilinear] {
+        let (limits, surface, _) = Cage { scheme, ..Cage::new(points.clone(), faces.clone()) }.limit(3);
+        for v in [0, 1, 3, 8, 9] {
+            if scheme == Scheme::CatmullClark && v == 9 {
+                continue;
+            }
+            assert_eq!(limits[v], DVec3::from(points[v].map(f64::from)), "{scheme:?} {v}");
+        }
+        assert!(limits.iter().all(|p| p.is_finite()));
+        assert!(surface.normals.iter().flatten().all(|x| x.is_finite()));
+    }
+}
