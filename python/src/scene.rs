@@ -89,6 +89,11 @@ impl PyScene {
         json::to_python(py, self.scene.diagnostics())
     }
 
+    /// Time of building the trees over triangles, seconds, summed over shapes.
+    fn tree_seconds(&self) -> f64 {
+        self.scene.tree_seconds
+    }
+
     /// What would be rendered, one (text, JSON) per product.
     fn plan(&self, py: Python<'_>, request: &str) -> Outcome<Vec<(String, String)>> {
         released(py, || {
