@@ -75,7 +75,12 @@ impl PyScene {
     fn save(&self, py: Python<'_>, path: PathBuf, embed: bool) -> Outcome<()> {
         released(py, || {
             let description = self.scene.description();
-            Ok(if embed { file::write(&path, &file::embedded(description))? } else { file::write(&path, description)? })
+            if embed {
+                file::write(&path, &file::embedded(description))?;
+            } else {
+                file::write(&path, description)?;
+            }
+            Ok(())
         })
     }
 
