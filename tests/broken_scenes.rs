@@ -237,7 +237,7 @@ fn requests_are_checked() {
     };
     says(request(0, 10, &["depth"]), "--width", "0");
     says(request(10, 10, &["depht"]), "--aov depht", "abbe aovs");
-    says(request(10, 10, &["color"]), "--aov color", "light transport");
+    says(request(10, 10, &["color"]), "--aov color", "has no 'color'");
     says(Request { integrator: Some("path".into()), ..Request::default() }, "integrator 'path'", "differentials");
     says(Request { camera: Some("/No".into()), ..Request::default() }, "--camera /No", "/World/Camera");
     says(Request { product: Some("/No".into()), ..Request::default() }, "--product /No", "none");

@@ -140,14 +140,49 @@ def warning_text(warning: Mapping[str, Any]) -> str:
     return f"{place}{more}: {warning['message']}"
 
 
+# Messages of one kind that are logged one by one; a production stage may have hundreds.
+_SHOWN = 3
+
+
+def warning_lines(warnings: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return warning records as lines for people: of each kind the first few messages, and how many there are more.
+
+    Parameters
+    ----------
+    warnings : records as in ``Scene.warnings``, where all of them stand
+
+    Returns
+    -------
+    list of str
+        By kind, in the order of first occurrence.
+    """
+    lines: list[str] = []
+    kinds: dict[str, list[Mapping[str, Any]]] = {}
+    for warning in warnings:
+        kinds.setdefault(warning["kind"], []).append(warning)
+    for kind, records in kinds.items():
+        # One more line costs no more than the one that says so.
+        shown = records if len(records) <= _SHOWN + 1 else records[:_SHOWN]
+        lines += map(warning_text, shown)
+        others = records[len(shown) :]
+        if others:
+            places = sum(record["count"] for record in others)
+            first = others[0]["places"][0] if others[0]["places"] else ""
+            lines.append(
+                f"{first} and {places - 1} more: other warnings of the kind {kind}, {len(others)} in all: "
+                "--stats FILE.json and Scene.warnings have them"
+            )
+    return lines
+
+
 class Scene:
     """A checked scene: loaded once, rendered often, from several threads if wanted. Nothing changes it."""
 
     def __init__(self, core: _core.Scene) -> None:
         self._core = core
         self._told: list[dict[str, Any]] = core.warnings()
-        for warning in self._told:
-            _log.warning("%s", warning_text(warning))
+        for line in warning_lines(self._told):
+            _log.warning("%s", line)
 
     @classmethod
     def from_stage(
@@ -440,9 +475,8 @@ class Scene:
                 progress(Progress(done, total, time.monotonic() - begin))
 
         film = self._core.render(_request(options), index, report if progress is not None else None)
-        for warning in film.statistics["warnings"]:
-            if warning not in self._told:
-                _log.warning("%s", warning_text(warning))
+        for line in warning_lines([w for w in film.statistics["warnings"] if w not in self._told]):
+            _log.warning("%s", line)
         return film
 
 

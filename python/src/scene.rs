@@ -75,7 +75,12 @@ impl PyScene {
     fn save(&self, py: Python<'_>, path: PathBuf, embed: bool) -> Outcome<()> {
         released(py, || {
             let description = self.scene.description();
-            Ok(if embed { file::write(&path, &file::embedded(description))? } else { file::write(&path, description)? })
+            if embed {
+                file::write(&path, &file::embedded(description))?;
+            } else {
+                file::write(&path, description)?;
+            }
+            Ok(())
         })
     }
 
@@ -87,6 +92,11 @@ impl PyScene {
     /// Warnings of the bridge and of the checks: dicts with kind, message, places and count.
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, self.scene.diagnostics())
+    }
+
+    /// Time of building the trees over triangles, seconds, summed over shapes.
+    fn tree_seconds(&self) -> f64 {
+        self.scene.tree_seconds
     }
 
     /// What would be rendered, one (text, JSON) per product.

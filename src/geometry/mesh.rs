@@ -1,11 +1,14 @@
 //! Triangle meshes: authored points, 32-bit corners, and only the attributes that say something.
 
+use std::time::{Duration, Instant};
+
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Buffer;
+use super::cut::{Corners, Cut};
 use super::motion::{Between, Deformation, Deformed};
-use super::polygons::{Interpolation, PolygonMesh, PrimvarView};
+use super::polygons::{NamedPrimvar, PolygonMesh, PrimvarView};
 use super::start::{Start, behind};
 use super::subdivision::{Refined, Refiner};
 use super::topology;
@@ -13,8 +16,6 @@ use super::tree::{Bounds, Tree};
 use super::triangle::{Corner, ShearedRay, TriangleHit};
 use crate::Result;
 
-/// A triangle whose area is below this share of its longest edge squared is a line to the digits of its points.
-const SLIVER: f64 = 1e-12;
 /// Normals that differ from the facet's by less are the facet's, computed by an exporter in f32: sixteen of its steps.
 const FLAT: f64 = 16.0 / 16_777_216.0;
 
@@ -46,7 +47,9 @@ pub struct MeshReport {
     pub degenerate: usize,
     /// Faces with fewer than three corners, left out.
     pub short_faces: usize,
-    /// Edges (by position) at which an odd number of faces meet.
+    /// Time taken by the tree.
+    pub tree_time: Duration,
+    /// Edges (by position) at which an odd number of faces meet; this and the next two only if asked for.
     pub open_edges: usize,
     /// Edges whose faces do not run against each other, as those of a consistent orientation do.
     pub misoriented_edges: usize,
@@ -119,13 +122,15 @@ impl Mesh {
     /// Errors begin with the prim path and the attribute. What is only odd (faces of two corners, triangles without area,
     /// overlapping subsets, primvars of the wrong size) is left out and stands in the report.
     pub fn from_polygons(polygons: &PolygonMesh<'_>) -> Result<(Self, MeshReport)> {
-        Self::deforming(polygons, None)
+        Self::deforming(polygons, None, true)
     }
 
-    /// The same with points that move as the checked `deformation` has them, which is as long as they are.
+    /// The same with points that move as the checked `deformation` has them, which is as long as they are. Whether the mesh is
+    /// closed is only found out if `asks_closed`: no surface needs it but that of a medium.
     pub(crate) fn deforming(
         polygons: &PolygonMesh<'_>,
         deformation: Option<Deformation>,
+        asks_closed: bool,
     ) -> Result<(Self, MeshReport)> {
         polygons.check()?;
         let mut report =
@@ -135,7 +140,8 @@ impl Mesh {
         let Some(refiner) = refiner(polygons, &mut report) else {
             let deformation =
                 deformation.map(|d| Deformation { normals: d.normals.filter(|_| polygons.normals.is_some()), ..d });
-            return Ok(Self::assemble(polygons, deformation, face_slots.as_deref(), polygons, report));
+            let control = asks_closed.then_some(polygons);
+            return Ok(Self::assemble(polygons, deformation, face_slots.as_deref(), control, report));
         };
         let holes = refiner.holes();
         let control = PolygonMesh { holes: &holes, ..polygons.clone() };
@@ -143,43 +149,27 @@ impl Mesh {
         let refined = Refined::new(&refiner, polygons);
         drop(refiner);
         let face_slots = face_slots.map(|slots| refined.of_faces(&slots));
-        Ok(Self::assemble(&refined.polygons(polygons), deformation, face_slots.as_deref(), &control, report))
+        let control = asks_closed.then_some(&control);
+        Ok(Self::assemble(&refined.polygons(polygons), deformation, face_slots.as_deref(), control, report))
     }
 
-    /// Triangles of checked polygons. Whether the mesh has an inside is decided by `control`.
+    /// Triangles of checked polygons. Whether the mesh has an inside is decided by `control`, if there is one.
     fn assemble(
         polygons: &PolygonMesh<'_>,
         deformation: Option<Deformation>,
         face_slots: Option<&[u16]>,
-        control: &PolygonMesh<'_>,
+        control: Option<&PolygonMesh<'_>>,
         mut report: MeshReport,
     ) -> (Self, MeshReport) {
-        let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(polygons.triangle_count());
-        let mut slots = face_slots.map(|_| Vec::new());
-        let mut normals = polygons.normals.as_ref().map(Collector::new);
-        let mut uv = polygons.uv.as_ref().map(Collector::new);
-        let mut primvars: Vec<_> =
-            polygons.primvars.iter().map(|named| Some(Collector::new(&named.as_ref()?.view))).collect();
-        polygons.triangulate(|face, corners| {
-            let moved = deformation.iter().flat_map(|d| &d.points);
-            let points = moved.map(|points| corners.map(|corner| widen(points[polygons.indices[corner] as usize])));
-            if is_sliver(corners.map(|corner| polygons.point(corner))) && points.into_iter().all(is_sliver) {
-                report.degenerate += 1;
-                return;
-            }
-            triangles.push(corners.map(|corner| polygons.indices[corner] as u32));
-            if let (Some(slots), Some(face_slots)) = (&mut slots, face_slots) {
-                slots.push(face_slots[face]);
-            }
-            for values in [&mut normals, &mut uv].into_iter().chain(&mut primvars).flatten() {
-                values.push(face, corners, polygons.indices);
-            }
-        });
-        report.triangles = triangles.len();
-        let imbalance = topology::imbalance(control);
-        report.open_edges = imbalance.open;
-        report.misoriented_edges = imbalance.misoriented;
-        report.is_closed = imbalance == topology::Imbalance::default() && !triangles.is_empty();
+        let Cut { triangles, slots, normals, uv, primvars, degenerate } =
+            Cut::new(polygons, deformation.as_ref(), face_slots);
+        (report.triangles, report.degenerate) = (triangles.len(), degenerate);
+        if let Some(control) = control {
+            let imbalance = topology::imbalance(control);
+            report.open_edges = imbalance.open;
+            report.misoriented_edges = imbalance.misoriented;
+            report.is_closed = imbalance == topology::Imbalance::default() && !triangles.is_empty();
+        }
 
         let points = polygons.points.clone();
         let bounds_of = |i: usize| {
@@ -187,19 +177,26 @@ impl Mesh {
             let moved = deformation.iter().flat_map(|d| &d.points);
             moved.fold(at(&points), |all, points| all.union(&at(points)))
         };
+        let begin = Instant::now();
         let tree = Tree::build(triangles.len(), bounds_of);
-        let bounds = (0..triangles.len()).into_par_iter().map(bounds_of).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
+        report.tree_time = begin.elapsed();
+        let bounds = tree.extent();
+        let values = |primvar: &Option<PrimvarView<'_>>, indices| {
+            primvar.as_ref().map(|primvar| CornerValues { values: primvar.values.clone(), indices })
+        };
+        let primvar = |(named, indices): (&Option<NamedPrimvar<'_>>, Corners)| {
+            let NamedPrimvar { columns, view, .. } = named.as_ref()?;
+            Some((*columns, CornerValues { values: view.values.clone(), indices }))
+        };
         let mut mesh = Self {
             points,
             deformation,
             triangles,
-            normals: normals.map(Collector::finish),
+            normals: values(&polygons.normals, normals),
             normals_reversed: false,
-            uv: uv.map(Collector::finish),
+            uv: values(&polygons.uv, uv),
             uv_number: polygons.uv_number,
-            primvars: (polygons.primvars.iter().zip(primvars))
-                .map(|(named, values)| Some((named.as_ref()?.columns, values?.finish())))
-                .collect(),
+            primvars: polygons.primvars.iter().zip(primvars).map(primvar).collect(),
             slots,
             tree,
             bounds,
@@ -394,37 +391,6 @@ impl Mesh {
     }
 }
 
-/// Collects the values of corners while triangles are made.
-struct Collector<'a> {
-    primvar: &'a PrimvarView<'a>,
-    /// Absent where points and values have the same index.
-    indices: Option<Vec<[u32; 3]>>,
-}
-
-impl<'a> Collector<'a> {
-    fn new(primvar: &'a PrimvarView<'a>) -> Self {
-        let by_point = matches!(primvar.interpolation, Interpolation::Vertex | Interpolation::Varying);
-        Self { primvar, indices: (!by_point || primvar.indices.is_some()).then(Vec::new) }
-    }
-
-    fn push(&mut self, face: usize, corners: [usize; 3], points: &[i32]) {
-        let Some(indices) = &mut self.indices else { return };
-        indices.push(corners.map(|corner| {
-            let element = match self.primvar.interpolation {
-                Interpolation::Constant => 0,
-                Interpolation::Uniform => face,
-                Interpolation::Varying | Interpolation::Vertex => points[corner] as usize,
-                Interpolation::FaceVarying => corner,
-            };
-            self.primvar.indices.map_or(element as u32, |indices| indices[element] as u32)
-        }));
-    }
-
-    fn finish(self) -> CornerValues {
-        CornerValues { values: self.primvar.values.clone(), indices: self.indices }
-    }
-}
-
 /// The refined topology of a subdivision surface; `None` for polygons and for what cannot be refined.
 fn refiner(polygons: &PolygonMesh<'_>, report: &mut MeshReport) -> Option<Refiner> {
     let subdivision = polygons.subdivision.as_ref().filter(|subdivision| subdivision.level > 0)?;
@@ -453,14 +419,6 @@ fn face_slots(polygons: &PolygonMesh<'_>, report: &mut MeshReport) -> Option<Vec
     }
     report.faces_in_several_subsets = several.into_iter().filter(|&s| s).count();
     Some(slots)
-}
-
-/// Whether a triangle has no area to speak of.
-fn is_sliver([a, b, c]: [DVec3; 3]) -> bool {
-    let (e1, e2, e3) = (b - a, c - a, c - b);
-    let longest = e1.length_squared().max(e2.length_squared()).max(e3.length_squared());
-    let twice_area = e1.cross(e2).length();
-    twice_area <= 2.0 * SLIVER * longest
 }
 
 fn bounds_of(corners: [[f32; 3]; 3]) -> Bounds {

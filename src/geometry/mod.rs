@@ -14,6 +14,7 @@ mod aggregate;
 mod asphere;
 mod buffer;
 mod cuboid;
+mod cut;
 mod departures;
 mod instances;
 mod mesh;

@@ -163,12 +163,16 @@ fn extent(shape: &Shape) -> f64 {
     }
 }
 
+/// Longest to shortest direction of a transform that places anything. The boxes of the trees are padded by 2^-49 times as much
+/// ([`walk`](super::walk)), for every instance beside it: a sheet thinner than this is nothing to the digits of its rays.
+const FLATTEST: f64 = 1_099_511_627_776.0;
+
 /// Whether the inverse exists to working precision: the volume is compared with that of the columns' box, so scale is free.
 pub(crate) fn is_invertible(transform: &DAffine3) -> bool {
     let m = transform.matrix3;
     let box_volume = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
     let inverse = transform.inverse();
-    m.determinant().abs() > 1e-14 * box_volume && inverse.is_finite()
+    m.determinant().abs() > 1e-14 * box_volume && inverse.is_finite() && norm(m) * norm(inverse.matrix3) <= FLATTEST
 }
 
 /// The inverse, by way of a power of two so that determinants of tiny and huge transforms do not under- or overflow.

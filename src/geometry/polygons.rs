@@ -1,5 +1,7 @@
 //! Polygon meshes as authored: checked here, and cut into triangles.
 
+use std::ops::Range;
+
 use earcut::Earcut;
 use glam::{DVec2, DVec3};
 
@@ -112,7 +114,7 @@ impl<'a> PolygonMesh<'a> {
                 return Err(self.error(name, format!("{len} elements are more than 2147483647; split the mesh")));
             }
         }
-        if let Some(i) = self.points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+        if let Some(i) = not_finite(self.points.as_flattened()).map(|i| i / 3) {
             return Err(self.error("points", format!("point {i} is not finite; correct or remove it")));
         }
         if let Some(i) = self.counts.iter().position(|&n| n < 0) {
@@ -174,18 +176,13 @@ impl<'a> PolygonMesh<'a> {
         mesh
     }
 
-    /// How many triangles its faces are cut into.
-    pub(super) fn triangle_count(&self) -> usize {
-        self.faces().map(|(_, _, count)| count - 2).sum()
-    }
-
     /// What is wrong with a primvar of `width` floats a value: the attribute and the problem.
     fn primvar_problem(&self, name: &str, primvar: &PrimvarView<'_>, width: usize) -> Option<(String, String)> {
         let values = primvar.values.len() / width;
         if !primvar.values.len().is_multiple_of(width) {
             return Some((name.to_owned(), format!("{} floats are not a multiple of {width}", primvar.values.len())));
         }
-        if let Some(i) = primvar.values.iter().position(|x| !x.is_finite()) {
+        if let Some(i) = not_finite(&primvar.values) {
             return Some((name.to_owned(), format!("value {} is not finite; correct or remove it", i / width)));
         }
         let elements = match primvar.interpolation {
@@ -212,15 +209,38 @@ impl<'a> PolygonMesh<'a> {
 
     /// Which faces are not holes and have at least three corners, with their first corner and their number of corners.
     pub(super) fn faces(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
+        let holes = self.hole_flags();
+        self.faces_of(0..self.counts.len(), 0).filter(move |&(face, ..)| !is_hole(&holes, face))
+    }
+
+    /// Whether each face is a hole; empty where none is.
+    pub(super) fn hole_flags(&self) -> Vec<bool> {
         let mut holes = vec![false; if self.holes.is_empty() { 0 } else { self.counts.len() }];
         for &hole in self.holes {
             holes[hole as usize] = true;
         }
+        holes
+    }
+
+    /// The faces in pieces of work, at least one.
+    pub(super) fn pieces(&self) -> Vec<Piece> {
+        const FACES: usize = 1 << 15;
         let mut next = 0;
-        self.counts.iter().enumerate().filter_map(move |(face, &count)| {
+        let piece = |(number, counts): (usize, &[i32])| {
+            let (first, begin) = (next, number * FACES);
+            next += counts.iter().map(|&count| count as usize).sum::<usize>();
+            Piece { faces: begin..begin + counts.len(), first }
+        };
+        let pieces: Vec<_> = self.counts.chunks(FACES).enumerate().map(piece).collect();
+        if pieces.is_empty() { vec![Piece { faces: 0..0, first: 0 }] } else { pieces }
+    }
+
+    /// Faces of at least three corners in a range whose first corner is `next`.
+    fn faces_of(&self, faces: Range<usize>, mut next: usize) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
+        self.counts[faces.clone()].iter().zip(faces).filter_map(move |(&count, face)| {
             let first = next;
             next += count as usize;
-            (count >= 3 && !holes.get(face).is_some_and(|&hole| hole)).then_some((face, first, count as usize))
+            (count >= 3).then_some((face, first, count as usize))
         })
     }
 
@@ -230,11 +250,14 @@ impl<'a> PolygonMesh<'a> {
         DVec3::new(x.into(), y.into(), z.into())
     }
 
-    /// Calls `emit` with every triangle: its face and its corners (positions in `indices`), counter-clockwise seen from
-    /// outside whatever the authored orientation.
-    pub(super) fn triangulate(&self, mut emit: impl FnMut(usize, [usize; 3])) {
+    /// Calls `emit` with every triangle of a piece: its face and its corners (positions in `indices`), counter-clockwise seen
+    /// from outside whatever the authored orientation. `holes` are [`hole_flags`](Self::hole_flags).
+    pub(super) fn triangulate(&self, piece: &Piece, holes: &[bool], mut emit: impl FnMut(usize, [usize; 3])) {
         let mut cutter = Cutter::default();
-        for (face, first, count) in self.faces() {
+        for (face, first, count) in self.faces_of(piece.faces.clone(), piece.first) {
+            if is_hole(holes, face) {
+                continue;
+            }
             let mut put = |a: usize, b: usize, c: usize| {
                 let corners = if self.left_handed {
                     [first + a, first + c, first + b]
@@ -263,9 +286,37 @@ impl<'a> PolygonMesh<'a> {
     }
 }
 
+/// Faces that are cut by one thread.
+pub(super) struct Piece {
+    pub(super) faces: Range<usize>,
+    /// First corner of the first face.
+    first: usize,
+}
+
+fn is_hole(holes: &[bool], face: usize) -> bool {
+    holes.get(face).is_some_and(|&hole| hole)
+}
+
+/// What is looked through at once before anything in it is looked for: a maximum is taken of many elements at a time.
+const BLOCK: usize = 1 << 10;
+
 /// The first index that is negative or not below `len`.
 fn out_of_range(indices: &[i32], len: usize) -> Option<usize> {
-    indices.iter().position(|&i| usize::try_from(i).map_or(true, |i| i >= len))
+    // A negative index is above all others as an unsigned one.
+    let is_out = |i: u32| i as usize >= len;
+    let largest = |block: &[i32]| block.iter().fold(0, |largest, &i| largest.max(i as u32));
+    let block = indices.chunks(BLOCK).position(|block| is_out(largest(block)))?;
+    let at = indices[block * BLOCK..].iter().position(|&i| is_out(i as u32));
+    at.map(|at| block * BLOCK + at)
+}
+
+/// The first number that is not finite.
+fn not_finite(numbers: &[f32]) -> Option<usize> {
+    // Without their signs, infinities and what is no number are above all others.
+    let magnitude = |x: f32| x.to_bits() & 0x7fff_ffff;
+    let largest = |block: &[f32]| block.iter().fold(0, |largest, &x| largest.max(magnitude(x)));
+    let block = numbers.chunks(BLOCK).position(|block| largest(block) >= f32::INFINITY.to_bits())?;
+    numbers[block * BLOCK..].iter().position(|x| !x.is_finite()).map(|at| block * BLOCK + at)
 }
 
 /// Cuts one polygon after the other; keeps its memory.

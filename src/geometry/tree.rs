@@ -125,6 +125,14 @@ impl Tree {
 }
 
 impl Tree {
+    /// The box of everything; the scale is a power of two, so that no digit is lost.
+    pub(super) fn extent(&self) -> Bounds {
+        if self.nodes.is_empty() {
+            return Bounds::EMPTY;
+        }
+        Bounds { min: self.bounds[0] / self.scale, max: self.bounds[1] / self.scale }
+    }
+
     /// Largest coordinate of everything.
     pub(super) fn reach(&self) -> f64 {
         if self.nodes.is_empty() {

@@ -84,6 +84,10 @@ impl Tree {
         let scale = self.scale;
         let origin = origin * scale;
         let padding = PADDING + RELATIVE_PADDING * spread * (origin.abs().max_element() + 1.0);
+        // The ray does not tell where in the boxes it is, not even in which half of them.
+        if padding >= 1.0 {
+            return;
+        }
         let sized = |d: f64| if d.abs() < SMALLEST_DIRECTION { SMALLEST_DIRECTION.copysign(d) } else { d };
         let direction = DVec3::new(sized(direction.x), sized(direction.y), sized(direction.z));
         let inverse = direction.recip();

@@ -5,6 +5,7 @@
 //! their own and [`register`](Registry::register) it; `examples/custom_integrator.rs` does.
 
 pub mod chain;
+mod counters;
 pub mod differentials;
 mod screen_motion;
 mod search;

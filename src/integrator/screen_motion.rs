@@ -48,7 +48,7 @@ pub(super) fn of_end<C>(
     let mut offset = DVec2::ZERO;
     let mut found = [DVec2::ZERO; 2];
     for (found, time) in found.iter_mut().zip(FRAMES) {
-        if time != start.time {
+        if (time - start.time).abs() > 0.0 {
             let value = match &chain.end {
                 End::Surface(met) => point_at(task.view, met, start.time, time),
                 End::Miss | End::Exhausted => end.value,

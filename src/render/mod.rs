@@ -97,6 +97,8 @@ pub struct Statistics {
     pub non_finite_values: u64,
     /// Warnings of the bridge, the scene, the plan and the render.
     pub warnings: Diagnostics,
+    /// Time of building the trees over triangles when the scene was made, seconds, summed over shapes.
+    pub tree_seconds: f64,
     /// Wall time of building the tree about the camera, seconds.
     pub prepare_seconds: f64,
     /// Wall time of tracing, seconds.
@@ -245,7 +247,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
             "clipped-by-fallback",
             format!("{}.clippingRange", authored.path),
             format!(
-                "is not authored, and its fallback ({near}, {far}) hides surfaces from {} rays: author the range that is                  wanted",
+                "is not authored, and its fallback ({near}, {far}) hides surfaces from {} rays: author the range that is wanted",
                 counters.unseen
             ),
         );
@@ -271,6 +273,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
         warnings,
         prepare_seconds,
         trace_seconds,
+        tree_seconds: scene.tree_seconds,
         threads: rayon::current_num_threads(),
     };
     Ok(Rendered { film, metadata, statistics })

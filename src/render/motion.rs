@@ -49,7 +49,7 @@ pub(super) fn motion_plan(
         f64::max(if asks_for_vectors { 1.0 } else { 0.0 }, if blurs { close } else { 0.0 }),
     ];
     let is_read = stage.motion.is_some_and(|[low, high]| low <= needed[0] && needed[1] <= high);
-    if stage.time_code.is_some() && !is_read && needed != [0.0; 2] {
+    if stage.time_code.is_some() && !is_read && needed.iter().any(|&time| time != 0.0) {
         diagnostics.warn(
             "motion-not-read",
             &stage.source,

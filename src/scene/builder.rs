@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use rayon::prelude::*;
 
@@ -42,7 +43,11 @@ pub fn build(description: Description) -> Result<Scene> {
     let (materials, material_ids) = build_materials(document, placed(), &mut resources, &mut diagnostics)?;
     let display_color = material::display_color(&mut resources);
     let Resources { store: textures, primvars, .. } = resources;
-    let shapes = build_shapes(&description, &used, &primvars, &mut diagnostics)?;
+    let mut has_interior = vec![false; document.shapes.len()];
+    placed().for_each(|p| has_interior[p.shape] |= is_medium(p.placement, &materials, &material_ids));
+    let wanted: Vec<_> =
+        used.iter().zip(&has_interior).map(|(&used, &asks_closed)| used.then_some(asks_closed)).collect();
+    let (shapes, tree_time) = build_shapes(&description, &wanted, &primvars, &mut diagnostics)?;
 
     let mut compiler = Compiler {
         shapes: &shapes,
@@ -120,6 +125,7 @@ pub fn build(description: Description) -> Result<Scene> {
         instances,
         skipped,
         counts,
+        tree_seconds: tree_time.as_secs_f64(),
         diagnostics,
         description,
     })
@@ -170,7 +176,7 @@ impl Compiler<'_> {
         let mut list = vec![material_of(placement.material)];
         list.extend(placement.subset_materials.iter().map(|m| material_of(m.or(placement.material))));
         list.resize(1 + report.subsets, list[0]);
-        if !report.is_closed && list.iter().any(|&id| id > 0 && self.materials[id as usize - 1].has_interior()) {
+        if !report.is_closed && list.iter().any(|&id| id > 0 && self.materials[id as usize - 1].is_glass_all_over()) {
             diagnostics.warn(
                 "open-glass-mesh",
                 &placement.path,
@@ -215,19 +221,30 @@ struct ShapeReport {
     subsets: usize,
 }
 
+/// Whether a material of a placement fills a volume, so that it matters whether the surface has an inside.
+fn is_medium(placement: &Placement, materials: &[Material], material_ids: &[u32]) -> bool {
+    let has_interior = |&index: &usize| {
+        let id = material_ids[index] as usize;
+        id > 0 && materials[id - 1].has_interior()
+    };
+    placement.material.iter().chain(placement.subset_materials.iter().flatten()).any(has_interior)
+}
+
+/// Compiles the shapes that are wanted, which says whether it is asked if they are closed. The time is that of their trees.
 fn build_shapes(
     description: &Description,
-    used: &[bool],
+    wanted: &[Option<bool>],
     names: &[String],
     diagnostics: &mut Diagnostics,
-) -> Result<Vec<Option<Compiled>>> {
+) -> Result<(Vec<Option<Compiled>>, Duration)> {
     let built: Vec<_> = description
         .document
         .shapes
         .par_iter()
-        .zip(used)
-        .map(|(shape, &used)| if used { build_shape(description, shape, names).map(Some) } else { Ok(None) })
+        .zip(wanted)
+        .map(|(shape, wanted)| wanted.map(|asks| build_shape(description, shape, names, asks)).transpose())
         .collect();
+    let mut tree_time = Duration::ZERO;
     let mut shapes = Vec::with_capacity(built.len());
     for (shape, result) in description.document.shapes.iter().zip(built) {
         let Some(built) = result? else {
@@ -250,6 +267,7 @@ fn build_shapes(
         };
         if let (description::Shape::Mesh(mesh), Some(report)) = (shape, &report) {
             meshes::report(mesh, report, diagnostics);
+            tree_time += report.tree_time;
         }
         let report = match report {
             None => {
@@ -268,7 +286,7 @@ fn build_shapes(
         };
         shapes.push(Some((compiled, report)));
     }
-    Ok(shapes)
+    Ok((shapes, tree_time))
 }
 
 /// What became of a shape.
@@ -283,8 +301,13 @@ enum Built {
 
 /// Compiles a shape. What the stage got wrong is no error but [`Built::Broken`]; arrays that the document names and the
 /// description lacks are damage to the description itself, and an error.
-fn build_shape(description: &Description, shape: &description::Shape, names: &[String]) -> Result<Built> {
-    match compile_shape(description, shape, names)? {
+fn build_shape(
+    description: &Description,
+    shape: &description::Shape,
+    names: &[String],
+    asks_closed: bool,
+) -> Result<Built> {
+    match compile_shape(description, shape, names, asks_closed)? {
         Ok(built) => Ok(built),
         Err(Error::Scene { place, problem }) => Ok(Built::Broken { place, problem }),
         Err(other) => Err(other),
@@ -292,7 +315,12 @@ fn build_shape(description: &Description, shape: &description::Shape, names: &[S
 }
 
 /// The outer error is the description's, the inner the stage's.
-fn compile_shape(description: &Description, shape: &description::Shape, names: &[String]) -> Result<Result<Built>> {
+fn compile_shape(
+    description: &Description,
+    shape: &description::Shape,
+    names: &[String],
+    asks_closed: bool,
+) -> Result<Result<Built>> {
     let solid = |shape: Option<Shape>| shape.map_or(Built::Nothing, |shape| Built::Shape(Arc::new(shape), None));
     match shape {
         description::Shape::Sphere { radius: 0.0, .. } => Ok(Ok(Built::Nothing)),
@@ -333,7 +361,7 @@ fn compile_shape(description: &Description, shape: &description::Shape, names: &
                 },
                 None => None,
             };
-            let mesh = Mesh::deforming(&polygons, deformation);
+            let mesh = Mesh::deforming(&polygons, deformation, asks_closed);
             Ok(mesh.map(|(mesh, report)| Built::Shape(Arc::new(Shape::Mesh(mesh)), Some(report))))
         }
         other => Ok(solids::compile(other).map(|compiled| solid(compiled.map(Shape::Solid)))),
@@ -432,6 +460,10 @@ impl<'a> NamedArrays<'a> {
 
     pub(super) fn integers(&self, name: &str) -> Result<&'a [i32]> {
         let array = self.get(name, Element::I32, 1)?;
+        // An empty array may begin anywhere.
+        if array.bytes.is_empty() {
+            return Ok(&[]);
+        }
         bytemuck::try_cast_slice(&array.bytes).map_err(|_| {
             Error::scene(self.place, format!("array '{name}' is not aligned to its elements: write the file again"))
         })

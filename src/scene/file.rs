@@ -65,25 +65,30 @@ pub fn write(path: &Path, description: &Description) -> Result<()> {
     atomic::replace(path, |out| atomic::put(out, path, &bytes))
 }
 
-/// The description with what is in the image files that it names, so that it is whole on another machine.
+/// The description with what is in the files that it names, images and profiles of lights, so that it is whole on another
+/// machine.
 ///
 /// Files that cannot be read stay names: they are warned of where they are looked up.
 pub fn embedded(description: &Description) -> Description {
     let mut whole = description.clone();
-    let mut known: BTreeMap<String, String> = BTreeMap::new();
-    for texture in &mut whole.document.textures {
+    let Description { document, arrays } = &mut whole;
+    let images = document.textures.iter_mut().flat_map(|texture| {
         let tiles = texture.tiles.iter_mut().map(|tile| &mut tile.asset);
-        for asset in std::iter::once(&mut texture.asset).chain(tiles) {
-            let Some(file) = asset.file.clone() else { continue };
-            if !known.contains_key(&file) {
-                let Ok(content) = std::fs::read(&file) else { continue };
-                let name = format!("file{}.content", known.len());
-                whole.arrays.insert(name.clone(), Array::from_vec(Element::U8, 1, content));
-                known.insert(file.clone(), name);
-            }
-            asset.content = known.get(&file).cloned();
-            asset.file = None;
+        std::iter::once(&mut texture.asset).chain(tiles)
+    });
+    let lights = document.groups.iter_mut().flat_map(|group| &mut group.lights);
+    let profiles = lights.filter_map(|light| light.shaping.as_mut()?.ies.as_mut());
+    let mut known: BTreeMap<String, String> = BTreeMap::new();
+    for asset in images.chain(profiles) {
+        let Some(file) = asset.file.clone() else { continue };
+        if !known.contains_key(&file) {
+            let Ok(content) = std::fs::read(&file) else { continue };
+            let name = format!("file{}.content", known.len());
+            arrays.insert(name.clone(), Array::from_vec(Element::U8, 1, content));
+            known.insert(file.clone(), name);
         }
+        asset.content = known.get(&file).cloned();
+        asset.file = None;
     }
     whole
 }

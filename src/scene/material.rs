@@ -82,6 +82,11 @@ pub struct Material {
 }
 
 impl Material {
+    /// Whether it is glass wherever it is: not only where some image says so.
+    pub fn is_glass_all_over(&self) -> bool {
+        self.has_interior() && self.appearance.opacity.as_ref().is_none_or(|opacity| opacity.below != Below::Glass)
+    }
+
     /// Whether a ray inside is in another medium.
     pub fn has_interior(&self) -> bool {
         matches!(self.kind, Kind::Dielectric { thin_walled: false, .. })

@@ -48,6 +48,8 @@ pub struct Scene {
     pub skipped: BTreeMap<String, u64>,
     /// Counts for the statistics: triangles stored, shapes, bytes.
     pub counts: Counts,
+    /// Time of building the trees over triangles, seconds, summed over shapes.
+    pub tree_seconds: f64,
     pub(crate) diagnostics: Diagnostics,
     pub(crate) description: Description,
 }

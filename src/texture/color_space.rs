@@ -77,17 +77,17 @@ impl ColorSpace {
             | "linear rec.709 (srgb)"
             | "utility - linear - srgb"
             | "utility - linear - rec.709" => (Linear, RgbSpace::REC709),
-            "g18_rec709" => (Gamma(1.8), RgbSpace::REC709),
-            "g22_rec709" => (Gamma(2.2), RgbSpace::REC709),
-            "g24_rec709" | "rec709_display" => (Gamma(2.4), RgbSpace::REC709),
+            "g18_rec709" | "gamma 1.8 rec.709 - texture" => (Gamma(1.8), RgbSpace::REC709),
+            "g22_rec709" | "gamma 2.2 rec.709 - texture" => (Gamma(2.2), RgbSpace::REC709),
+            "g24_rec709" | "rec709_display" | "gamma 2.4 rec.709 - texture" => (Gamma(2.4), RgbSpace::REC709),
             "acescg" | "lin_ap1" | "aces - acescg" => (Linear, RgbSpace::ACESCG),
-            "g22_ap1" => (Gamma(2.2), RgbSpace::ACESCG),
-            "srgb_ap1" => (Srgb, RgbSpace::ACESCG),
+            "g22_ap1" | "gamma 2.2 ap1 - texture" => (Gamma(2.2), RgbSpace::ACESCG),
+            "srgb_ap1" | "srgb encoded ap1 - texture" => (Srgb, RgbSpace::ACESCG),
             "aces2065-1" | "aces2065_1" | "lin_ap0" | "aces - aces2065-1" => (Linear, RgbSpace::ACES2065_1),
-            "lin_p3d65" | "lin_displayp3" => (Linear, RgbSpace::P3_D65),
+            "lin_p3d65" | "lin_displayp3" | "linear p3-d65" => (Linear, RgbSpace::P3_D65),
             "srgb_p3d65" | "srgb_displayp3" => (Srgb, RgbSpace::P3_D65),
-            "lin_rec2020" => (Linear, RgbSpace::REC2020),
-            "lin_adobergb" => (Linear, RgbSpace::ADOBE_RGB),
+            "lin_rec2020" | "linear rec.2020" => (Linear, RgbSpace::REC2020),
+            "lin_adobergb" | "linear adobergb" => (Linear, RgbSpace::ADOBE_RGB),
             "adobergb" | "g22_adobergb" => (Gamma(ADOBE_GAMMA), RgbSpace::ADOBE_RGB),
             "lin_ciexyzd65" => {
                 return Some(Self { transfer: Linear, to_rec709: Some(rows(RgbSpace::REC709.rgb_from_xyz())) });

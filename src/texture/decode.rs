@@ -187,6 +187,8 @@ fn png_is_srgb(bytes: &[u8]) -> Option<bool> {
                 // 1/2.2 in units of 1e-5, as everybody who means sRGB rounds it.
                 return Some((45_000..46_000).contains(&gamma));
             }
+            // A profile by its name; whether another one is sRGB in all but name is not looked at.
+            b"iCCP" if body.len() >= 4 && body[..4].eq_ignore_ascii_case(b"sRGB") => return Some(true),
             b"IDAT" => return None,
             _ => rest = body.get(length.checked_add(4)?..)?,
         }

@@ -89,9 +89,9 @@ pub struct TextureCounts {
 /// An image that was looked up and is not there or cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unreadable {
-    /// The property that names it.
+    /// The property that names it, and the file.
     pub place: String,
-    /// The file, and what is wrong with it.
+    /// What is wrong with it.
     pub problem: String,
     /// It was not found at all.
     pub missing: bool,
@@ -294,7 +294,7 @@ impl Image {
 
 impl Slot {
     fn unreadable(&self, problem: &str, missing: bool) -> Unreadable {
-        Unreadable { place: self.place.clone(), problem: format!("'{}' {problem}", self.name), missing }
+        Unreadable { place: format!("{} = '{}'", self.place, self.name), problem: problem.to_owned(), missing }
     }
 }
 

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ import pytest
 
 import abbe
 from abbe import _core
+from abbe._api import warning_lines
 
 Slab = Callable[..., Path]
 
@@ -520,3 +522,18 @@ def test_nothing_at_all_is_no_error() -> None:
 def test_bad_arguments_of_the_calculus_are_named(arguments: tuple[npt.ArrayLike, ...], text: str) -> None:
     with pytest.raises(abbe.UsageError, match=text):
         abbe.refract(*arguments)
+
+
+def test_many_warnings_of_a_kind_are_told_in_few_lines() -> None:
+    def record(kind: str, i: int, count: int = 1) -> dict[str, Any]:
+        return {"kind": kind, "message": f"message {i}", "places": [f"</P{i}>"], "count": count}
+
+    many = [record("missing-material", i, count=i + 1) for i in range(40)]
+    lines = warning_lines([record("other", 0), *many[:20], record("other", 1), *many[20:]])
+    told = ["</P0>: message 0", "</P1>: message 1"]
+    assert lines[:5] == [*told, "</P0>: message 0", "</P1> and 1 more: message 1", "</P2> and 2 more: message 2"]
+    assert len(lines) == 6
+    assert lines[5].startswith("</P3> and 813 more: other warnings of the kind missing-material, 37 in all: ")
+    # Four are as short as three and a count.
+    assert warning_lines(many[:4])[3] == "</P3> and 3 more: message 3"
+    assert warning_lines([]) == []

@@ -128,6 +128,13 @@ def test_what_is_seen_lies_where_usd_places_it(results: dict[str, dict[str, Any]
     assert sum(result.get("seen", 0) > 0 for result in results.values()) > 200
 
 
+def test_every_hit_is_seen_where_usds_camera_projects_it(results: dict[str, dict[str, Any]]) -> None:
+    framed = {name: result["framing"] for name, result in results.items() if result.get("framing") is not None}
+    # Positions are single precision; some worlds are far from their origin.
+    assert {name: off for name, off in framed.items() if off > 2e-3} == {}
+    assert len(framed) > 30
+
+
 def test_something_is_seen_where_there_is_something(results: dict[str, dict[str, Any]]) -> None:
     empty = {
         name

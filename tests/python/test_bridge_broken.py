@@ -19,6 +19,7 @@ def Sphere "Good"
 }
 def Camera "Shot"
 {
+ float2 clippingRange = (0.01, 1e30)
 }
 """
 TRIANGLE = {
@@ -156,6 +157,9 @@ LEFT_OUT = {
     "scaled beyond all numbers": (
         moved("double3 xformOp:scale = (1e300, 1e300, 1e300)", "xformOp:scale"), 0, "singular-transform", "/Bad", ""
     ),
+    "a sheet of 1e-300": (
+        moved("double3 xformOp:scale = (1e-300, 1, 1)", "xformOp:scale"), 0, "singular-transform", "/Bad", "flattens"
+    ),
     "a translation that is none": (
         moved("double3 xformOp:translate = (nan, 0, 0)", "xformOp:translate"), 0, "broken-prim", "</Bad>", "not finite"
     ),
@@ -242,3 +246,31 @@ def test_what_belongs_to_one_prim_is_left_out_and_named(name, tmp_path, capfd):
     # Nothing of it under --strict.
     with pytest.raises(StageError, match=r"--strict"):
         scene.plan('{"aovs": ["depth"], "strict": true}')
+
+
+@pytest.mark.parametrize("distance", [1e15, 1e30, 1e300])
+def test_a_camera_too_far_away_to_see_anything_sees_nothing(distance, tmp_path):
+    camera = moved(f"double3 xformOp:translate = (0, 0, {distance:g})", "xformOp:translate").replace("Sphere", "Camera")
+    (tmp_path / "stage.usda").write_text("#usda 1.0\n" + camera + mesh().replace("Bad", "Mesh"))
+    description = describe(tmp_path / "stage.usda")
+    scene = _core.Scene(description.to_json(), description.arrays)
+    film = scene.render('{"aovs": ["depth", "dispersion"], "width": 8, "height": 8}')
+    assert film.statistics["complete"] and film.statistics["non_finite_values"] == 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ("rel camera = </Render.camera>", r"^</Render>\.camera: leads back to itself: name a Camera"),
+        ("rel camera = </Nope>", r"^</Render>\.camera: there is no </Nope>"),
+        ("rel camera = </Good>", r"^</Render>\.camera: </Good> is a Sphere, not a Camera"),
+        ("rel products = </Render>", r"^</Render>\.products: </Render> is a RenderSettings, not a RenderProduct"),
+        ("uniform int2 resolution = (1000000000, 1000000000)", r"Render\.resolution: is \(1000000000, 1000000000\)"),
+        ("uniform float pixelAspectRatio = nan", r"^</Render>\.pixelAspectRatio = .*: is not 1 finite number"),
+    ],
+)
+def test_what_the_settings_ask_for_and_cannot_be_had_is_an_error(settings, message, tmp_path):
+    (tmp_path / "stage.usda").write_text(GOOD + f'def RenderSettings "Render"\n{{\n {settings}\n}}\n')
+    with pytest.raises(StageError, match=message):
+        description = describe(tmp_path / "stage.usda")
+        _core.Scene(description.to_json(), description.arrays).plan('{"aovs": ["depth"]}')

@@ -377,3 +377,77 @@ def Sphere "S"
 """
     with_extent, without = checked(in_memory(decorated)), checked(in_memory(plain))
     assert with_extent.document == without.document
+
+
+def test_what_is_skipped_is_never_read(monkeypatch):
+    """Of what nobody asked for, only what says so is read: not an array, not a network."""
+    mesh = """ point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+ int[] faceVertexCounts = [3]
+ int[] faceVertexIndices = [0, 1, 2]
+ uniform token subdivisionScheme = "none"
+"""
+    text = f"""def Mesh "Hidden"
+{{
+{mesh} token visibility = "invisible"
+}}
+def Xform "HiddenParent"
+{{
+ token visibility = "invisible"
+ def Mesh "Child"
+ {{
+{mesh} }}
+}}
+def Mesh "Proxy"
+{{
+{mesh} uniform token purpose = "proxy"
+}}
+def Mesh "Off" (
+ active = false
+)
+{{
+{mesh}}}
+def Material "Unused"
+{{
+ float inputs:x = 1
+ token outputs:surface.connect = </Unused/S.outputs:surface>
+ def Shader "S"
+ {{
+  uniform token info:id = "UsdPreviewSurface"
+  color3f inputs:diffuseColor.connect = </Unused/T.outputs:rgb>
+  token outputs:surface
+ }}
+ def Shader "T"
+ {{
+  uniform token info:id = "UsdUVTexture"
+  asset inputs:file = @texture.png@
+  color3f outputs:rgb
+ }}
+}}
+def Mesh "Shown"
+{{
+{mesh}}}
+def Camera "C"
+{{
+}}
+"""
+    read = {}
+    original = Usd.Attribute.Get
+
+    def counted(self, *arguments):
+        read.setdefault(str(self.GetPrim().GetPath()), set()).add(self.GetName())
+        return original(self, *arguments)
+
+    monkeypatch.setattr(Usd.Attribute, "Get", counted)
+    description = checked(in_memory(text))
+    assert set(placed(description)) == {"/Shown"}
+    assert {"points", "faceVertexCounts", "faceVertexIndices"} <= read["/Shown"]
+    settling = {"visibility", "purpose"}
+    for skipped in ("/Hidden", "/HiddenParent/Child", "/Proxy"):
+        assert read[skipped] <= settling, skipped
+    assert not any(path.startswith(("/Unused", "/Off")) for path in read)
+    assert description.document["skipped"] == {"invisible": 2, "purpose proxy": 1}
+    assert description.document["materials"] == [] and set(description.arrays) == {
+        "shape0.points",
+        "shape0.face_vertex_counts",
+        "shape0.face_vertex_indices",
+    }

@@ -115,7 +115,7 @@ def RenderProduct "B"
     uniform bool disableDepthOfField = 0
     uniform int abbe:samples = 8
     custom string outputs:driver:parameters:artist = "not ours"
-    custom string driver:parameters:comment.connect = </Source.loop>
+    string driver:parameters:comment.connect = </Source.loop>
 }
 """
 

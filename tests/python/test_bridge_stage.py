@@ -674,6 +674,7 @@ def test_a_folder_and_other_things_are_no_stages(tmp_path):
         ("Camera", "focusDistance", "float focusDistance = inf"),
         ("Camera", "clippingRange", "float clippingRange = 1"),
         ("Camera", "clippingRange", "float2 clippingRange = (nan, 1)"),
+        ("Camera", "clippingRange", "float2 clippingRange = (0.5, -inf)"),
         ("RenderSettings", "resolution", 'string resolution = "HD"'),
         ("RenderSettings", "dataWindowNDC", "float4 dataWindowNDC = (0, 0, inf, 1)"),
         ("RenderSettings", "includedPurposes", "int includedPurposes = 3"),

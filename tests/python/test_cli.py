@@ -154,6 +154,8 @@ def test_statistics_and_preview(run: Run, slab: Slab, tmp_path: Path) -> None:
     assert stats["renders"][0]["output"] == "out.exr"
     assert stats["renders"][0]["complete"] is True
     assert stats["renders"][0]["frame"] == 7
+    # With NumPy, USD and a film: some tens of megabytes at least, and no more than a machine has.
+    assert 10e6 < stats["peak_memory_bytes"] < 1e12
     assert (tmp_path / "look.png").read_bytes().startswith(b"\x89PNG")
     assert leftovers(tmp_path) == ["look.png", "out.exr", "stats.json"]
     # All have the rights that the umask gives.

@@ -299,3 +299,14 @@ def test_settings_are_listed_with_what_is_not_usual(run: Run, file: Path) -> Non
     assert result.returncode == 0, result.stderr
     assert "window -0.25, 0, 0.5, 1.25 (y up)" in result.stdout
     assert "P: P (raw, color3f)" in result.stdout
+
+
+def test_flags_have_usdrecords_names(run: Run, file: Path, tmp_path: Path) -> None:
+    (tmp_path / "over.usda").write_text('#usda 1.0\nover "Main"\n{\n    float focalLength = 80\n}\n')
+    flags = ("--mask", "/Wall,/Main /Render", "--sessionLayer", "over.usda", "--purposes", "render,proxy")
+    more = ("--imageWidth", "24", "-cam", "Main", "-rs", "/Render/Settings", "-f", "1", "--disableGpu")
+    result = run("render", file, "<OS>.####.exr", *flags, *more, "--disableCameraLight", "--quiet")
+    assert result.returncode == 0, result.stderr
+    assert window(tmp_path / "Beauty.0001.exr").display == (24, 16)
+    spec = oiio.ImageInput.open(str(tmp_path / "Beauty.0001.exr")).spec()
+    assert spec.getattribute("nominalFocalLength") == pytest.approx(80)

@@ -14,13 +14,11 @@ def add(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser("lights", help="list the lights of a stage", allow_abbrev=False)
     options.add_stage(parser)
-    parser.add_argument(
-        "--render-settings", "--renderSettingsPrimPath", "-rs", metavar="P", help="path of a RenderSettings prim"
-    )
+    options.add_settings(parser.add_argument_group("whose lights"))
     parser.add_argument("--json", action="store_true", help="all of it as JSON")
     options.add_quiet(parser)
     # What lights do not depend on.
-    parser.set_defaults(run=run, camera=None, product=None, scalar_ior=None, strict=False)
+    parser.set_defaults(run=run, product=None, scalar_ior=None, strict=False)
 
 
 def run(args: argparse.Namespace) -> int:

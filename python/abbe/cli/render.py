@@ -14,6 +14,7 @@ from .. import __version__
 from .._api import Options, Scene, counted
 from .._core import Film
 from .._files import replacing
+from .._memory import peak_memory
 from ..errors import AbbeError, UsageError
 from ..frame_tokens import has_product_token
 from . import frames, messages, options
@@ -148,7 +149,10 @@ def _seconds(seconds: float) -> str:
 
 
 def _write_statistics(path: str, outcome: _Outcome) -> None:
-    document = {"abbe": __version__, "renders": outcome.renders}
+    document: dict[str, Any] = {"abbe": __version__, "renders": outcome.renders}
+    peak = peak_memory()
+    if peak is not None:
+        document["peak_memory_bytes"] = peak
     with replacing(path) as temporary:
         temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 

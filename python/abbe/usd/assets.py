@@ -8,13 +8,14 @@ studio's own resolver) crosses as what is in it, so that renders without USD hav
 from __future__ import annotations
 
 import os
+import zipfile
 from typing import Any
 
 import numpy as np
 
 from . import tokens
 from ._pxr import Ar, Sdf, Usd, UsdShade
-from .description import ArrayTable
+from .description import Array, ArrayTable
 from .values import place
 
 __all__ = ["AssetReader"]
@@ -87,10 +88,9 @@ class AssetReader:
         """Return the name of the array with what is in an asset, None where it cannot be opened."""
         if resolved not in self._contents:
             with Ar.ResolverContextBinder(self._context):
-                opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved))
-            if opened is None:
+                content = _opened(resolved)
+            if content is None:
                 return None
-            content = np.frombuffer(opened.GetBuffer(), np.uint8)
             self._contents[resolved] = self._table.add(f"asset{len(self._contents)}.content", content)
         return self._contents[resolved]
 
@@ -102,6 +102,21 @@ class AssetReader:
                 authored = pattern.replace(tokens.TILE_PATTERNS[0], number)
                 tiles.append({"number": int(number), "asset": self._found(authored, str(resolved))})
         return tiles
+
+
+def _opened(resolved: str) -> Array | None:
+    """Return what is in an asset, None where it cannot be opened."""
+    resolver = Ar.GetResolver()
+    if hasattr(resolver, "OpenAsset"):
+        opened = resolver.OpenAsset(Ar.ResolvedPath(resolved))
+        return None if opened is None else np.frombuffer(opened.GetBuffer(), np.uint8)
+    # Older versions of USD open assets from C++ alone; a package of theirs is a zip archive all the same.
+    package, member = Ar.SplitPackageRelativePathOuter(resolved)
+    try:
+        with zipfile.ZipFile(package) as archive:
+            return np.frombuffer(archive.read(member), np.uint8)
+    except (OSError, KeyError, zipfile.BadZipFile):
+        return None
 
 
 def _layer(attribute: Any) -> Any:

@@ -10,10 +10,10 @@ import numpy as np
 
 from ..errors import StageError
 from . import tokens
-from ._pxr import Gf, Sdf, Usd, UsdGeom
+from ._pxr import Gf, Sdf, Usd, UsdGeom, UsdUtils
 from .values import is_finite, matrix, place, read
 
-__all__ = ["all_cameras", "find_camera", "framed_camera", "read_camera"]
+__all__ = ["all_cameras", "default_camera", "find_camera", "framed_camera", "read_camera"]
 
 # How many cameras an error names before it stops.
 _LISTED = 8
@@ -96,7 +96,12 @@ def read_camera(prim: Any, time: Any, transforms: Any) -> dict[str, Any]:
     clipping = read(prim, camera.GetClippingRangeAttr().GetName(), time)
     if clipping is not None:
         numbers = np.asarray(clipping)
-        if numbers.shape != (2,) or numbers.dtype.kind not in "fiu" or np.isnan(numbers).any() or np.isinf(numbers[0]):
+        if (
+            numbers.shape != (2,)
+            or numbers.dtype.kind not in "fiu"
+            or not np.isfinite(numbers[0])
+            or not numbers[1] > -np.inf
+        ):
             name = camera.GetClippingRangeAttr().GetName()
             raise StageError(f"{place(prim)}.{name} = {clipping}: is no range: give it a near and a far distance")
         # An infinite far plane is as good as the farthest that the attribute can hold.
@@ -132,6 +137,22 @@ def _exposure(prim: Any, number: Callable[[Any, float], float]) -> dict[str, flo
 
 # The largest float32, which is what UsdGeomCamera's clippingRange can hold.
 _FARTHEST = 3.4028234663852886e38
+
+
+def default_camera(stage: Any, settings: Any, cameras: list[Any]) -> Any:
+    """Return the settings' camera, else the primary one by USD's convention, else the first; None if there is none."""
+    if settings is not None:
+        relationship = settings.GetRelationship(tokens.CAMERA)
+        targets = relationship.GetForwardedTargets() if relationship else []
+        if relationship and relationship.GetTargets() and not targets:
+            raise StageError(f"{place(relationship)}: leads back to itself: name a Camera")
+        for path in targets:
+            prim = stage.GetPrimAtPath(path)
+            if prim and prim.IsA(UsdGeom.Camera):
+                return prim
+    primary = UsdUtils.GetPrimaryCameraName()
+    named = (prim for prim in cameras if prim.GetName() == primary)
+    return next(named, cameras[0] if cameras else None)
 
 
 def framed_camera(low: Any, high: Any, up_axis: str) -> dict[str, Any]:

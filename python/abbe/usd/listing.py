@@ -7,11 +7,10 @@ from typing import Any, Unpack
 
 from . import tokens
 from ._pxr import UsdGeom, UsdRender
-from .cameras import all_cameras, read_camera
+from .cameras import all_cameras, default_camera, read_camera
 from .composition import quiet_usd
 from .description import Diagnostics
 from .metadata import stage_time
-from .reader import default_camera
 from .render import all_settings, find_settings, read_settings, token_list
 from .stage import Opening, open_stage, source_name
 

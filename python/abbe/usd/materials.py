@@ -154,15 +154,18 @@ class MaterialReader:
         inputs, drivers = self._inputs(network, prim, tokens.INPUTS_PREFIX)
         ours = {name: value for name, value in inputs.items() if name.startswith(tokens.ABBE_PREFIX)}
         outputs = {name: nodes.output(driver) for name, driver in drivers.items()}
-        return {
+        description = {
             "path": str(prim.GetPath()),
             "id": _identifier(prim, terminal),
             "terminal": terminal,
             "inputs": {name: value for name, value in inputs.items() if name not in ours},
             "connected": {name: driver.path for name, driver in drivers.items()},
-            "networks": {name: output for name, output in outputs.items() if output is not None},
             "abbe": ours,
         }
+        networks = {name: output for name, output in outputs.items() if output is not None}
+        if networks:
+            description["networks"] = networks
+        return description
 
     def _inputs(self, network: Network, prim: Any, prefix: str) -> tuple[dict[str, Any], dict[str, Driver]]:
         """Return the constant inputs whose names begin with ``prefix``, and the outputs that drive the others."""

@@ -6,7 +6,6 @@ in a warning with its prim path; what was not asked for is counted.
 
 from __future__ import annotations
 
-import enum
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -16,13 +15,14 @@ import numpy as np
 
 from ..errors import StageError, UsageError
 from . import tokens
-from ._pxr import Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+from ._pxr import Sdf, Tf, Usd, UsdGeom
 from .assets import AssetReader
-from .cameras import find_camera, framed_camera, read_camera
+from .cameras import default_camera, find_camera, framed_camera, read_camera
 from .composition import composition_warnings, quiet_usd, usd_reason
 from .description import Array, ArrayTable, BrokenError, Description, Diagnostics
 from .geometry import ShapeReader
 from .instancers import InstancerReader
+from .kinds import GEOMETRY, Kind, classify
 from .lenses import is_lens
 from .lights import LightReader, is_light
 from .links import link_lights
@@ -32,70 +32,21 @@ from .motion import MotionReader, motion_span
 from .passes import ActivePass, Appearance, find_pass
 from .places import Places
 from .primvars import PrimvarReader
-from .render import find_settings, read_settings, token_list
-from .solids import solid_kind
+from .render import binding_purposes, find_settings, read_settings, rendered_purposes
 from .stage import KeptStage, OpenedStage, Opening, open_stage, source_name
 from .subdivision import refinement_level
 from .values import IDENTITY, is_finite, place, read
 
-__all__ = ["default_camera", "read_stage"]
+__all__ = ["read_stage"]
 
 FORMAT = "abbe-scene"
 VERSION = 1
 
 
-class _Kind(enum.Enum):
-    """What the bridge does with prims of a type."""
-
-    MESH = enum.auto()
-    SPHERE = enum.auto()
-    SOLID = enum.auto()
-    LENS = enum.auto()
-    CAMERA = enum.auto()
-    LIGHT = enum.auto()
-    UNSUPPORTED = enum.auto()
-    INSTANCER = enum.auto()
-    SKELETAL = enum.auto()
-    UNKNOWN = enum.auto()
-    PASS_THROUGH = enum.auto()
-    LEAF = enum.auto()
-
-
-_GEOMETRY = (_Kind.MESH, _Kind.SPHERE, _Kind.SOLID, _Kind.LENS)
-
-
-def _classify(prim: Any) -> _Kind:
-    """Return what to do with prims of this one's type; LEAF where nothing below can be rendered."""
-    if prim.IsA(UsdGeom.Mesh):
-        return _Kind.MESH
-    if prim.IsA(UsdGeom.Sphere):
-        return _Kind.SPHERE
-    if solid_kind(prim) is not None:
-        return _Kind.SOLID
-    if prim.IsA(UsdGeom.Camera):
-        return _Kind.CAMERA
-    if prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase):
-        return _Kind.LIGHT
-    if prim.IsA(UsdLux.LightFilter):
-        # Of those that a light asks for, the light's reader speaks.
-        return _Kind.LEAF
-    if prim.IsA(UsdGeom.PointInstancer):
-        return _Kind.INSTANCER
-    if prim.GetTypeName() in ("SkelRoot", "Skeleton"):
-        return _Kind.SKELETAL if prim.GetTypeName() == "SkelRoot" else _Kind.PASS_THROUGH
-    if prim.IsA(UsdGeom.Boundable):
-        return _Kind.UNSUPPORTED
-    if prim.IsA(UsdShade.NodeGraph) or prim.IsA(UsdShade.Shader):  # a Material is a NodeGraph
-        return _Kind.LEAF
-    if prim.GetTypeName() and not prim.GetPrimTypeInfo().GetSchemaType():
-        return _Kind.UNKNOWN
-    return _Kind.PASS_THROUGH
-
-
 class _Facts(NamedTuple):
     """What a prim says of itself; the same for a prim of a prototype under every instance."""
 
-    kind: _Kind
+    kind: Kind
     invisible: bool
     purpose: str | None
     """None where none is authored."""
@@ -171,7 +122,7 @@ class _Walk:
         self.instancers = InstancerReader(time, diagnostics, self._table)
         self.groups: list[_Group] = [_Group("/")]
         self.cameras: list[Any] = []
-        self._kinds: dict[str, _Kind] = {}
+        self._kinds: dict[str, Kind] = {}
         self._facts_by_prim: dict[Any, _Facts] = {}
         self._hidden: dict[tuple[Any, str], bool] = {}
         self._group_by_prototype: dict[tuple[Any, str | None, Appearance], int] = {}
@@ -202,7 +153,7 @@ class _Walk:
             kind = facts.kind
             # In a prototype, what stands above may be an `over`, but what is drawn is defined.
             undefined = group.root is not None and prim.GetSpecifier() == Sdf.SpecifierOver
-            if kind is _Kind.LEAF or undefined:
+            if kind is Kind.LEAF or undefined:
                 prims.PruneChildren()
                 continue
             if self._pass is not None and self._pass.prunes(path):
@@ -211,16 +162,16 @@ class _Walk:
                 continue
             state = self._inherit(prim, facts, parent)
             states.append(state)
-            if kind is _Kind.LENS:
+            if kind is Kind.LENS:
                 # What stands below is what other software draws in its place.
                 prims.PruneChildren()
-            if kind is _Kind.INSTANCER:
+            if kind is Kind.INSTANCER:
                 # Its prototypes usually stand below it and are not drawn where they stand.
                 prims.PruneChildren()
             try:
-                if kind is _Kind.INSTANCER:
+                if kind is Kind.INSTANCER:
                     self._instance(prim, source or prim, str(path), state, group)
-                elif kind is not _Kind.PASS_THROUGH:
+                elif kind is not Kind.PASS_THROUGH:
                     self._visit(prim, source or prim, str(path), facts, state, group)
                 elif prim.IsModel():
                     self._check_draw_mode(prim, state)
@@ -307,12 +258,12 @@ class _Walk:
         type_name = prim.GetTypeName()
         kind = self._kinds.get(type_name)
         if kind is None:
-            kind = self._kinds[type_name] = _classify(prim)
-        if kind in (_Kind.MESH, _Kind.PASS_THROUGH) and is_lens(prim):
-            kind = _Kind.LENS
-        shines = kind is _Kind.LIGHT or is_light(prim)
-        if shines and kind is _Kind.PASS_THROUGH:
-            kind = _Kind.LIGHT
+            kind = self._kinds[type_name] = classify(prim)
+        if kind in (Kind.MESH, Kind.PASS_THROUGH) and is_lens(prim):
+            kind = Kind.LENS
+        shines = kind is Kind.LIGHT or is_light(prim)
+        if shines and kind is Kind.PASS_THROUGH:
+            kind = Kind.LIGHT
         attribute = prim.GetAttribute(tokens.PURPOSE)
         authored = bool(attribute) and attribute.HasAuthoredValue()
         return _Facts(
@@ -351,7 +302,7 @@ class _Walk:
     def _visit(self, prim: Any, source: Any, path: str, facts: _Facts, state: _State, group: _Group) -> None:
         """Do with a prim what its kind asks for; ``source`` is what it shares with other instances, or itself."""
         kind = facts.kind
-        if kind is _Kind.CAMERA:
+        if kind is Kind.CAMERA:
             if group.root is None:
                 self.cameras.append(prim)
             return
@@ -368,22 +319,22 @@ class _Walk:
             self.diagnostics.skip("invisible")
             return
         if facts.shines:
-            group.lights.append(_Light(prim, None if kind in _GEOMETRY else self._transform(prim, group)))
-        if kind is _Kind.LIGHT:
+            group.lights.append(_Light(prim, None if kind in GEOMETRY else self._transform(prim, group)))
+        if kind is Kind.LIGHT:
             return
-        if kind is _Kind.MESH:
+        if kind is Kind.MESH:
             self._place(prim, path, self.shapes.mesh(prim, source), state, group)
-        elif kind is _Kind.SPHERE:
+        elif kind is Kind.SPHERE:
             self._place(prim, path, self.shapes.sphere(prim, source), state, group)
-        elif kind is _Kind.LENS:
+        elif kind is Kind.LENS:
             self._place(prim, path, self.shapes.lens(prim, source), state, group)
-        elif kind is _Kind.SOLID:
+        elif kind is Kind.SOLID:
             self._place(prim, path, self.shapes.solid(prim, source), state, group)
-        elif kind is _Kind.SKELETAL:
+        elif kind is Kind.SKELETAL:
             self.diagnostics.warn(
                 "unsupported-prim", place(prim), "skinning is not supported; meshes below are rendered as authored"
             )
-        elif kind is _Kind.UNKNOWN:
+        elif kind is Kind.UNKNOWN:
             self.diagnostics.warn(
                 "unknown-prim-type",
                 place(prim),
@@ -633,11 +584,11 @@ def _read(
     if active_pass is not None:
         render_settings = active_pass.settings
     settings_prim = find_settings(stage, render_settings, source, diagnostics)
-    shown = _purposes(purposes, settings_prim)
+    shown = rendered_purposes(purposes, settings_prim)
     walk = _Walk(opened, time, shown, active_pass, refinement_level(complexity), diagnostics)
     walk.run()
     assets = AssetReader(stage, time)
-    materials = MaterialReader(time, diagnostics, _binding_purposes(settings_prim), assets)
+    materials = MaterialReader(time, diagnostics, binding_purposes(settings_prim), assets)
     groups = walk.bind(materials)
     metadata = stage_metadata(opened, time_code, diagnostics)
     link_sets = walk.shine(LightReader(time, metadata["up_axis"], assets, diagnostics), groups)
@@ -683,38 +634,6 @@ def _read(
         "strict_assets": missing == "error",
     }
     return Description(document, {**walk.arrays(), **assets.arrays})
-
-
-def _purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[str]:
-    """Return the purposes to render: those asked for, else the settings', else default and render; default always."""
-    if wanted is None:
-        authored = None if settings is None else token_list(settings, tokens.INCLUDED_PURPOSES)
-        return frozenset([tokens.DEFAULT, *(tokens.DEFAULT_PURPOSES if authored is None else authored)])
-    if isinstance(wanted, str):
-        wanted = wanted.replace(",", " ").split()
-    for purpose in wanted:
-        if purpose not in tokens.PURPOSES:
-            raise UsageError(f"purposes: '{purpose}' is none: choose from {', '.join(tokens.PURPOSES)}")
-    return frozenset([tokens.DEFAULT, *wanted])
-
-
-def _binding_purposes(settings: Any) -> Sequence[str]:
-    """Return the material purposes in the order in which they count: the settings', else full and all-purpose."""
-    authored = None if settings is None else token_list(settings, tokens.MATERIAL_BINDING_PURPOSES)
-    return tokens.BINDING_PURPOSES if authored is None else authored
-
-
-def default_camera(stage: Any, settings: Any, cameras: list[Any]) -> Any:
-    """Return the settings' camera, else the primary one by USD's convention, else the first; None if there is none."""
-    if settings is not None:
-        relationship = settings.GetRelationship(tokens.CAMERA)
-        for path in relationship.GetForwardedTargets() if relationship else []:
-            prim = stage.GetPrimAtPath(path)
-            if prim and prim.IsA(UsdGeom.Camera):
-                return prim
-    primary = UsdUtils.GetPrimaryCameraName()
-    named = (prim for prim in cameras if prim.GetName() == primary)
-    return next(named, cameras[0] if cameras else None)
 
 
 def _framed(walk: _Walk, up_axis: str, source: str, strict: bool, diagnostics: Diagnostics) -> dict[str, Any]:

@@ -10,10 +10,10 @@ honoured, and a connection gives the value of what it leads to instead of its pa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ..errors import StageError
+from ..errors import StageError, UsageError
 from ..frame_tokens import expand_frame_tokens
 from . import tokens
 from ._pxr import Sdf, Usd, UsdGeom, UsdRender
@@ -21,7 +21,15 @@ from .description import Diagnostics
 from .materials import warn_unknown_names
 from .values import authored, authored_namespace, place, plain, read
 
-__all__ = ["all_settings", "find_settings", "read_settings", "token_list", "typed_prim"]
+__all__ = [
+    "all_settings",
+    "binding_purposes",
+    "find_settings",
+    "read_settings",
+    "rendered_purposes",
+    "token_list",
+    "typed_prim",
+]
 
 
 def all_settings(stage: Any) -> list[Any]:
@@ -322,3 +330,22 @@ class _Reader:
         ):
             raise StageError(f"{place(prim)}.{name} = {value}: is not {count} finite number(s): correct the value")
         return [kind(number) for number in numbers]
+
+
+def rendered_purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[str]:
+    """Return the purposes to render: those asked for, else the settings', else default and render; default always."""
+    if wanted is None:
+        authored = None if settings is None else token_list(settings, tokens.INCLUDED_PURPOSES)
+        return frozenset([tokens.DEFAULT, *(tokens.DEFAULT_PURPOSES if authored is None else authored)])
+    if isinstance(wanted, str):
+        wanted = wanted.replace(",", " ").split()
+    for purpose in wanted:
+        if purpose not in tokens.PURPOSES:
+            raise UsageError(f"purposes: '{purpose}' is none: choose from {', '.join(tokens.PURPOSES)}")
+    return frozenset([tokens.DEFAULT, *wanted])
+
+
+def binding_purposes(settings: Any) -> Sequence[str]:
+    """Return the material purposes in the order in which they count: the settings', else full and all-purpose."""
+    authored = None if settings is None else token_list(settings, tokens.MATERIAL_BINDING_PURPOSES)
+    return tokens.BINDING_PURPOSES if authored is None else authored

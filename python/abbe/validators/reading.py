@@ -88,6 +88,10 @@ class CompiledMaterial:
         return [self.document.get("abbe", {}), *surfaces, self.document.get("interface_abbe", {})]
 
 
+# Kinds of warnings for prims that are left out since nobody can render what they say.
+_BROKEN = ("broken-prim", "broken-shape", "broken-transform")
+
+
 class Reading:
     """What validators ask of a stage; each answer is found once."""
 
@@ -121,18 +125,19 @@ class Reading:
             return error
 
     @cached_property
-    def refusal(self) -> Remark | None:
-        """Why the stage cannot be read or its geometry cannot be used; materials are looked at one by one."""
+    def refusals(self) -> list[Remark]:
+        """Why the stage cannot be read, or which prims a render leaves out; materials are looked at one by one."""
         if isinstance(self.described, StageError):
-            return self.error(self.described)
+            return [self.error(self.described)]
         document = self.described.document
         groups = [{**group, "items": [_bare(item) for item in group["items"]]} for group in document["groups"]]
         bare = Description({**document, "groups": groups, "materials": []}, self.described.arrays)
         try:
-            _core.Scene(bare.to_json(), bare.arrays)
+            scene = _core.Scene(bare.to_json(), bare.arrays)
         except AbbeError as error:
-            return self.error(error)
-        return None
+            return [self.error(error)]
+        broken = [warning for warning in scene.warnings() if warning["kind"] in _BROKEN]
+        return [dataclasses.replace(remark, severity="error") for warning in broken for remark in _warnings(warning)]
 
     @cached_property
     def materials(self) -> dict[str, CompiledMaterial]:

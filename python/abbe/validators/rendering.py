@@ -19,10 +19,11 @@ __all__ = ["camera", "render_settings", "render_vars", "stage"]
 
 
 def stage(reading: Reading) -> Iterator[Finding]:
-    """Tell why the stage cannot be read, or its geometry not be used, if so."""
-    # What the settings are refused for is told of there, for each of them.
-    if reading.refusal is not None and reading.refusal not in reading.render_remarks:
-        yield reading.finding("abbe:Stage", reading.refusal)
+    """Tell why the stage cannot be read, or which prims cannot be rendered, if so."""
+    for refusal in reading.refusals:
+        # What the settings are refused for is told of there, for each of them.
+        if refusal not in reading.render_remarks:
+            yield reading.finding("abbe:Stage", refusal)
 
 
 def camera(reading: Reading) -> Iterator[Finding]:

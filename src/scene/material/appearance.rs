@@ -245,7 +245,7 @@ impl<'a> Painter<'a, '_, '_> {
         let emission_color = self.color(model.emission_color.0, model.emission_color.1)?;
         let emission_weight = self.number(model.emission_weight)?;
         let emission = self.b().binary(F::Multiply, emission_color, emission_weight)?;
-        let is_black = matches!(self.b().value(emission), Some([r, g, b, _]) if [r, g, b] == [0.0; 3]);
+        let is_black = matches!(self.b().value(emission), Some([r, g, b, _]) if [r, g, b].iter().all(|&x| x == 0.0));
         let normal = self.networks.register(model.normal);
         let b = &self.networks.builder;
         Ok(Appearance {

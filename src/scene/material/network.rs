@@ -18,13 +18,8 @@ const MOST_NODES: usize = 4096;
 /// Why a node has no operations.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Obstacle {
-    /// The node with this path and identifier is none that is known, or has inputs that are not.
-    Unknown {
-        /// Prim path.
-        path: String,
-        /// `info:id`, and what of it.
-        what: String,
-    },
+    /// A node is none that is known, or something about it is not.
+    Unknown(String),
     /// There are too many of them.
     TooLarge,
 }
@@ -32,7 +27,7 @@ pub(super) enum Obstacle {
 impl std::fmt::Display for Obstacle {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Unknown { path, what } => write!(f, "{what} of <{path}> is not understood"),
+            Self::Unknown(what) => f.write_str(what),
             Self::TooLarge => f.write_str("the network is too large"),
         }
     }
@@ -105,4 +100,91 @@ fn needed<'a>(shader: &'a Shader, nodes: &'a [Node]) -> Result<Vec<&'a NodeOutpu
         }
     }
     Ok(wanted.into_iter().flatten().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::super::{Context, Material, ScalarIor, compile};
+    use super::*;
+    use crate::diagnostics::Diagnostics;
+    use crate::scene::description::{self, Description};
+    use crate::texture::Store;
+
+    const CONTEXT: Context = Context { scalar_ior: ScalarIor::Constant, meters_per_unit: 1.0 };
+
+    /// A material whose diffuse colour is the output `out` of the node `driver`.
+    fn compiled(nodes: &Value, driver: usize) -> crate::Result<(Material, Diagnostics)> {
+        let document = json!({
+            "format": description::FORMAT, "version": description::VERSION,
+            "stage": {"source": "", "meters_per_unit": 1.0, "up_axis": "Y"},
+            "shapes": [], "groups": [], "root": 0, "materials": [], "cameras": [],
+            "textures": [{"place": "</M/T>.inputs:file", "asset": {"path": "t.png"}}],
+        });
+        let document = serde_json::from_value(document).expect("is a document");
+        let description = Description { document, arrays: BTreeMap::new() };
+        let material = serde_json::from_value(json!({
+            "path": "/M", "nodes": nodes,
+            "surface": {
+                "path": "/M/S", "id": "UsdPreviewSurface", "terminal": "outputs:surface",
+                "connected": {"diffuseColor": "/M/N.outputs:out"},
+                "networks": {"diffuseColor": {"node": driver, "output": "out"}},
+            },
+        }))
+        .expect("is a material");
+        let mut diagnostics = Diagnostics::default();
+        let material = compile(&material, &CONTEXT, &mut Resources::new(&description), &mut diagnostics)?;
+        Ok((material, diagnostics))
+    }
+
+    fn number(value: f64) -> Value {
+        json!({"type": "float", "value": value})
+    }
+
+    fn refused(nodes: &Value, driver: usize) -> String {
+        compiled(nodes, driver).expect_err("is damaged").to_string()
+    }
+
+    #[test]
+    fn a_damaged_network_is_refused_and_never_followed() {
+        let add = |source: usize| json!({"path": "/M/N", "id": "ND_add_color3", "connected": {"in1": {"node": source, "output": "out"}}});
+        assert!(refused(&json!([]), 0).starts_with("</M/S>: is driven by node 0 of 0"));
+        // Itself, a later one, and one that is not there.
+        for source in [0, 1, 7] {
+            assert!(refused(&json!([add(source)]), 0).starts_with("</M/N>: node 0 is driven by node"), "{source}");
+        }
+        let image = json!([{"path": "/M/T", "id": "UsdUVTexture", "textures": {"file": 9}}]);
+        assert!(refused(&image, 0).starts_with("</M/T>: refers to texture 9 of 1"));
+        let many: Vec<_> = (0..MOST_NODES + 1).map(|i| add(i.saturating_sub(1))).collect();
+        assert!(refused(&json!(many), 0).contains("more than 4096"));
+    }
+
+    #[test]
+    fn the_longest_chain_of_nodes_needs_no_stack() {
+        let first = json!({"path": "/M/N", "id": "ND_constant_float", "inputs": {"value": number(1.0)}});
+        let add = |i: usize| {
+            json!({"path": "/M/N", "id": "ND_add_float", "inputs": {"in2": number(1.0)},
+                "connected": {"in1": {"node": i - 1, "output": "out"}}})
+        };
+        let chain: Vec<_> = std::iter::once(first).chain((1..MOST_NODES).map(add)).collect();
+        let (material, diagnostics) = compiled(&json!(chain), MOST_NODES - 1).expect("is sound");
+        // Too many operations for one material: its default, and a word about it.
+        assert_eq!(diagnostics.warnings()[0].kind, "unread-network");
+        assert_eq!(material.appearance.albedo.as_constant(), Some([0.18, 0.18, 0.18, 1.0]));
+        let (material, _) = compiled(&json!(chain), 100).expect("is sound");
+        assert_eq!(material.appearance.albedo.as_constant(), Some([101.0; 4]));
+    }
+
+    #[test]
+    fn what_is_not_understood_is_named_with_its_node() {
+        let nodes = json!([
+            {"path": "/M/Noise", "id": "ND_noise3d_color3"},
+            {"path": "/M/N", "id": "ND_invert_color3", "connected": {"in": {"node": 0, "output": "out"}}},
+        ]);
+        let (material, diagnostics) = compiled(&nodes, 1).expect("is sound");
+        let warning = diagnostics.warnings()[0].to_string();
+        assert!(warning.contains("a network that is not understood (the node 'ND_noise3d_color3')"), "{warning}");
+        assert_eq!(material.appearance.albedo.at(&Store::default(), |_| None)[0].to_bits(), 0.18_f32.to_bits());
+    }
 }

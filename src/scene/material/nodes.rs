@@ -54,7 +54,7 @@ fn reader_width(suffix: &str) -> Option<usize> {
 
 impl Inputs<'_> {
     fn unknown<T>(&self, what: impl Into<String>) -> Compiled<T> {
-        Err(Obstacle::Unknown { path: self.node.path.clone(), what: what.into() })
+        Err(Obstacle::Unknown(what.into()))
     }
 
     /// The input `name`, if somebody gave it a value.
@@ -66,7 +66,7 @@ impl Inputs<'_> {
             None => Ok(None),
             Some(authored) => match numbers(&authored.value) {
                 Some(value) => Ok(Some(b.constant(value)?)),
-                None => self.unknown(format!("the value of inputs:{name}")),
+                None => self.unknown(format!("the value of inputs:{name} of the node '{}'", self.node.id)),
             },
         }
     }
@@ -431,10 +431,27 @@ fn computed(
         let fallback = inputs.or("fallback", [0.0, 0.0, 0.0, 1.0], b)?;
         return channel(fallback, output, b);
     }
+    if id.starts_with("MayaND_fileTexture_") {
+        return maya_file(inputs, b);
+    }
     match id.strip_prefix("ND_") {
         Some(rest) => materialx(inputs, rest, output, b, resources),
         None => inputs.unknown(format!("the node '{id}'")),
     }
+}
+
+/// What maya-usd writes behind an image: gain and offset of a Maya file node.
+fn maya_file(inputs: &Inputs<'_>, b: &mut Builder) -> Compiled<Register> {
+    const READ: [&str; 5] = ["inColor", "uvCoord", "defaultColor", "colorGain", "colorOffset"];
+    if let Some(name) =
+        inputs.node.inputs.keys().chain(inputs.node.connected.keys()).find(|n| !READ.contains(&n.as_str()))
+    {
+        return inputs.unknown(format!("inputs:{name} of the node '{}'", inputs.node.id));
+    }
+    let color = inputs.number("inColor", 0.5, b)?;
+    let [gain, offset] = [inputs.number("colorGain", 1.0, b)?, inputs.number("colorOffset", 0.0, b)?];
+    let scaled = b.binary(F::Multiply, color, gain)?;
+    Ok(b.binary(F::Add, scaled, offset)?)
 }
 
 /// The nodes of MaterialX; `rest` is the identifier without `ND_`.
