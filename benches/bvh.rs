@@ -41,12 +41,12 @@ fn ball(rings: usize) -> (Vec<[f32; 3]>, Vec<i32>) {
     (points, indices)
 }
 
-fn mesh(points: &Buffer<[f32; 3]>, counts: &[i32], indices: &[i32]) -> Mesh {
+fn mesh(points: &Buffer<[f32; 3]>, counts: &[i32], indices: &Buffer<i32>) -> Mesh {
     let polygons = PolygonMesh {
         path: "/Ball",
         points: points.clone(),
         counts,
-        indices,
+        indices: indices.clone(),
         holes: &[],
         left_handed: false,
         normals: None,
@@ -62,7 +62,7 @@ fn mesh(points: &Buffer<[f32; 3]>, counts: &[i32], indices: &[i32]) -> Mesh {
 fn scene(rings: usize) -> Aggregate {
     let (points, indices) = ball(rings);
     let counts = vec![3; indices.len() / 3];
-    let shape = Arc::new(Shape::Mesh(mesh(&Buffer::from_vec(points), &counts, &indices)));
+    let shape = Arc::new(Shape::Mesh(mesh(&Buffer::from_vec(points), &counts, &Buffer::from_vec(indices))));
     Aggregate::build(&[Instance { shape, world_from_object: DAffine3::IDENTITY.into() }], DVec3::ZERO)
 }
 
@@ -106,5 +106,6 @@ fn random(bencher: Bencher<'_, '_>, rings: usize) {
 fn build(bencher: Bencher<'_, '_>, rings: usize) {
     let (points, indices) = ball(rings);
     let (points, counts) = (Buffer::from_vec(points), vec![3; indices.len() / 3]);
+    let indices = Buffer::from_vec(indices);
     bencher.counter(ItemsCount::new(counts.len())).bench_local(|| mesh(&points, &counts, &indices));
 }

@@ -47,6 +47,11 @@ impl<T: Pod> Buffer<T> {
         Self { bytes: Bytes::from_owner(Owned(elements)), element: PhantomData }
     }
 
+    /// The same memory as elements of another type; the error says what does not fit.
+    pub fn cast<U: Pod>(&self) -> Result<Buffer<U>, String> {
+        Buffer::new(self.bytes.clone())
+    }
+
     /// The elements.
     pub fn as_slice(&self) -> &[T] {
         if self.bytes.is_empty() { &[] } else { bytemuck::cast_slice(&self.bytes) }

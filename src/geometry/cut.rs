@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::Buffer;
 use super::motion::Deformation;
 use super::polygons::{Interpolation, Piece, PolygonMesh, PrimvarView};
 
@@ -70,7 +71,7 @@ impl Cut {
                 slots.push(face_slots[face]);
             }
             for values in [&mut normals, &mut uv].into_iter().chain(&mut primvars) {
-                values.push(face, corners, polygons.indices);
+                values.push(face, corners, &polygons.indices);
             }
         });
         let primvars = primvars.into_iter().map(|values| values.indices).collect();
@@ -92,6 +93,20 @@ impl Cut {
         }
         self.degenerate += other.degenerate;
     }
+}
+
+/// The corners of a mesh that is triangles already, as authored and without a copy, and where nothing but points stands at
+/// them; `None` where polygons must be cut. There may be triangles without area among them.
+pub(super) fn uncut(polygons: &PolygonMesh<'_>) -> Option<Buffer<[u32; 3]>> {
+    let is_by_point = |primvar: Option<&PrimvarView<'_>>| Collector::new(primvar).indices.is_none();
+    let is_uncut = !polygons.left_handed
+        && polygons.holes.is_empty()
+        && is_by_point(polygons.normals.as_ref())
+        && is_by_point(polygons.uv.as_ref())
+        && polygons.primvars.iter().all(|named| is_by_point(named.as_ref().map(|named| &named.view)))
+        && polygons.counts.iter().all(|&count| count == 3);
+    // Checked indices are not negative: the same bits.
+    if is_uncut { polygons.indices.cast().ok() } else { None }
 }
 
 /// Collects which values stand at corners while triangles are made.
@@ -125,7 +140,7 @@ impl<'a> Collector<'a> {
 }
 
 /// Whether a triangle has no area to speak of.
-fn is_sliver([a, b, c]: [DVec3; 3]) -> bool {
+pub(super) fn is_sliver([a, b, c]: [DVec3; 3]) -> bool {
     let (e1, e2, e3) = (b - a, c - a, c - b);
     let longest = e1.length_squared().max(e2.length_squared()).max(e3.length_squared());
     // Squared: points are single precision, so that nothing under- or overflows.

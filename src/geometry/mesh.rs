@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Buffer;
-use super::cut::{Corners, Cut};
+use super::cut::{Corners, Cut, is_sliver, uncut};
 use super::motion::{Between, Deformation, Deformed};
 use super::polygons::{NamedPrimvar, PolygonMesh, PrimvarView};
 use super::start::{Start, behind};
@@ -26,7 +26,7 @@ pub struct Mesh {
     /// Where the points are at other times.
     deformation: Option<Deformation>,
     /// Points of each triangle, counter-clockwise seen from outside.
-    triangles: Vec<[u32; 3]>,
+    triangles: Buffer<[u32; 3]>,
     normals: Option<CornerValues>,
     normals_reversed: bool,
     uv: Option<CornerValues>,
@@ -107,6 +107,32 @@ impl CornerValues {
     }
 }
 
+/// What stands at the corners of the triangles beside their points.
+struct Values {
+    slots: Option<Vec<u16>>,
+    normals: Corners,
+    uv: Corners,
+    primvars: Vec<Corners>,
+}
+
+impl Values {
+    /// As the points have it, for so many primvars.
+    fn by_point(primvars: usize) -> Self {
+        Self { slots: None, normals: None, uv: None, primvars: vec![None; primvars] }
+    }
+}
+
+/// The box of all triangles; `None` if one has no area.
+fn all_with_area(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Option<Bounds> {
+    triangles
+        .par_iter()
+        .map(|corners| {
+            let corners = corners.map(|p| points[p as usize]);
+            (!is_sliver(corners.map(widen))).then(|| bounds_of(corners))
+        })
+        .try_reduce(|| Bounds::EMPTY, |a, b| Some(a.union(&b)))
+}
+
 /// A candidate of a mesh, decided.
 pub(super) struct MeshHit {
     pub(super) primitive: u32,
@@ -161,9 +187,24 @@ impl Mesh {
         control: Option<&PolygonMesh<'_>>,
         mut report: MeshReport,
     ) -> (Self, MeshReport) {
-        let Cut { triangles, slots, normals, uv, primvars, degenerate } =
-            Cut::new(polygons, deformation.as_ref(), face_slots);
-        (report.triangles, report.degenerate) = (triangles.len(), degenerate);
+        let points = polygons.points.clone();
+        // The first pass over the triangles is the tree's; it finds out whether they can stay as they are.
+        let begin = Instant::now();
+        let authored = match (&deformation, face_slots) {
+            (None, None) => uncut(polygons).and_then(|t| Some((all_with_area(&points, &t)?, t))),
+            _ => None,
+        };
+        report.tree_time = begin.elapsed();
+        let (triangles, all, Values { slots, normals, uv, primvars }) = match authored {
+            Some((all, triangles)) => (triangles, Some(all), Values::by_point(polygons.primvars.len())),
+            None => {
+                let Cut { triangles, slots, normals, uv, primvars, degenerate } =
+                    Cut::new(polygons, deformation.as_ref(), face_slots);
+                report.degenerate = degenerate;
+                (Buffer::from_vec(triangles), None, Values { slots, normals, uv, primvars })
+            }
+        };
+        report.triangles = triangles.len();
         if let Some(control) = control {
             let imbalance = topology::imbalance(control);
             report.open_edges = imbalance.open;
@@ -171,15 +212,18 @@ impl Mesh {
             report.is_closed = imbalance == topology::Imbalance::default() && !triangles.is_empty();
         }
 
-        let points = polygons.points.clone();
+        let corners = triangles.as_slice();
         let bounds_of = |i: usize| {
-            let at = |points: &[[f32; 3]]| bounds_of(triangles[i].map(|p| points[p as usize]));
+            let at = |points: &[[f32; 3]]| bounds_of(corners[i].map(|p| points[p as usize]));
             let moved = deformation.iter().flat_map(|d| &d.points);
             moved.fold(at(&points), |all, points| all.union(&at(points)))
         };
         let begin = Instant::now();
-        let tree = Tree::build(triangles.len(), bounds_of);
-        report.tree_time = begin.elapsed();
+        let tree = match all {
+            Some(all) => Tree::within(&all, corners.len(), bounds_of),
+            None => Tree::build(corners.len(), bounds_of),
+        };
+        report.tree_time += begin.elapsed();
         let bounds = tree.extent();
         let values = |primvar: &Option<PrimvarView<'_>>, indices| {
             primvar.as_ref().map(|primvar| CornerValues { values: primvar.values.clone(), indices })
@@ -328,9 +372,10 @@ impl Mesh {
         mut found: impl FnMut(MeshHit) -> f64,
     ) {
         let sheared = ShearedRay::new(origin, direction);
+        let triangles = self.triangles.as_slice();
         let from = start.map_or(0.0, |start| -behind(start.magnitude));
         self.tree.walk(origin, direction, from, limit, 1.0, |primitive, limit| {
-            let corners = self.triangles[primitive as usize].map(&point);
+            let corners = triangles[primitive as usize].map(&point);
             let Some(hit) = sheared.intersect(corners) else { return limit };
             let (distance, at_start) = match start {
                 None if hit.distance > 0.0 => (hit.distance, false),

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use earcut::Earcut;
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::Buffer;
 use super::mesh::MeshProblem;
@@ -81,7 +82,7 @@ pub struct PolygonMesh<'a> {
     /// Corners of each face.
     pub counts: &'a [i32],
     /// Points of all corners, face after face.
-    pub indices: &'a [i32],
+    pub indices: Buffer<i32>,
     /// Faces that are holes.
     pub holes: &'a [i32],
     /// Winding is clockwise seen from outside.
@@ -131,7 +132,7 @@ impl<'a> PolygonMesh<'a> {
             ));
         }
         let points = self.points.len();
-        if let Some(i) = out_of_range(self.indices, points) {
+        if let Some(i) = out_of_range(&self.indices, points) {
             return Err(self.error(
                 "faceVertexIndices",
                 format!("index {i} is {}, but there are {points} points", self.indices[i]),
@@ -305,7 +306,7 @@ fn out_of_range(indices: &[i32], len: usize) -> Option<usize> {
     // A negative index is above all others as an unsigned one.
     let is_out = |i: u32| i as usize >= len;
     let largest = |block: &[i32]| block.iter().fold(0, |largest, &i| largest.max(i as u32));
-    let block = indices.chunks(BLOCK).position(|block| is_out(largest(block)))?;
+    let block = indices.par_chunks(BLOCK).position_first(|block| is_out(largest(block)))?;
     let at = indices[block * BLOCK..].iter().position(|&i| is_out(i as u32));
     at.map(|at| block * BLOCK + at)
 }
@@ -315,7 +316,7 @@ fn not_finite(numbers: &[f32]) -> Option<usize> {
     // Without their signs, infinities and what is no number are above all others.
     let magnitude = |x: f32| x.to_bits() & 0x7fff_ffff;
     let largest = |block: &[f32]| block.iter().fold(0, |largest, &x| largest.max(magnitude(x)));
-    let block = numbers.chunks(BLOCK).position(|block| largest(block) >= f32::INFINITY.to_bits())?;
+    let block = numbers.par_chunks(BLOCK).position_first(|block| largest(block) >= f32::INFINITY.to_bits())?;
     numbers[block * BLOCK..].iter().position(|x| !x.is_finite()).map(|at| block * BLOCK + at)
 }
 

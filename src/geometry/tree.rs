@@ -95,11 +95,16 @@ impl Bounds {
 impl Tree {
     /// A tree over `count` primitives with finite bounds.
     pub(crate) fn build(count: usize, bounds_of: impl Fn(usize) -> Bounds + Sync) -> Self {
+        let all = (0..count).into_par_iter().map(&bounds_of).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
+        Self::within(&all, count, bounds_of)
+    }
+
+    /// The same where the box of them `all` is known.
+    pub(super) fn within(all: &Bounds, count: usize, bounds_of: impl Fn(usize) -> Bounds + Sync) -> Self {
         if count == 0 {
             return Self::default();
         }
         assert!(count < 1 << 31, "primitives are counted in 31 bits");
-        let all = (0..count).into_par_iter().map(&bounds_of).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
         let (_, exponent) = libm::frexp(all.reach());
         // 2^-1022 … 2^1022: beyond, the boxes lose digits but stay bounds.
         let scale = libm::ldexp(1.0, (-exponent).clamp(-1022, 1022));

@@ -333,7 +333,7 @@ fn compile_shape(
             let arrays = NamedArrays { description, place: &mesh.path };
             let hole_indices = mesh.hole_indices.as_deref().map(|name| arrays.integers(name)).transpose()?;
             let counts = arrays.integers(&mesh.face_vertex_counts)?;
-            let indices = arrays.integers(&mesh.face_vertex_indices)?;
+            let indices = arrays.indices(&mesh.face_vertex_indices)?;
             let subsets = mesh
                 .subsets
                 .iter()

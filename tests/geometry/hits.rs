@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use abbe::geometry::{Instance, Shape};
+use abbe::geometry::{Instance, Mesh, PolygonMesh, Shape};
 use glam::{DAffine3, DMat3, DVec3};
 use proptest::prelude::*;
 
@@ -244,5 +244,28 @@ fn far_away_scenes_and_cameras_keep_their_hits() {
             let near = ray(aim, [t.cos(), t.sin(), 0.1]);
             assert_eq!(balance(&camera_relative, &near), (1, 1));
         }
+    }
+}
+
+#[test]
+fn triangles_that_stay_as_authored_are_those_that_are_cut() {
+    // The same cube as triangles that need no cutting, with one without area among them, and wound the other way.
+    let points = cube_points(1.0);
+    let indices: Vec<i32> = CUBE_INDICES.chunks(4).flat_map(|q| [q[0], q[1], q[2], q[0], q[2], q[3]]).collect();
+    let counts = [3; 13];
+    let uncut = mesh(&points, &counts[..12], &indices).0;
+    let (cut, report) = mesh(&points, &counts, &[&indices[..15], &[0, 1, 0], &indices[15..]].concat());
+    assert_eq!((report.degenerate, report.triangles), (1, 12));
+    let turned: Vec<i32> = indices.chunks(3).flat_map(|t| [t[0], t[2], t[1]]).collect();
+    let mirrored = PolygonMesh { left_handed: true, ..polygons(&points, &counts[..12], &turned) };
+    let mirrored = Mesh::from_polygons(&mirrored).expect("a mesh").0;
+    let scenes = [uncut, cut, mirrored].map(|mesh| aggregate(&[at_origin(&Arc::new(Shape::Mesh(mesh)))]));
+    for i in 0..200 {
+        let t = f64::from(i);
+        let direction = DVec3::new((1.7 * t).sin(), (2.3 * t).cos(), (0.7 * t).sin() + 0.1).normalize();
+        let middle = DVec3::splat(0.5) + 0.2 * direction.any_orthonormal_vector();
+        let ray = ray(middle - 3.0 * direction, direction);
+        let [a, b, c] = scenes.each_ref().map(|scene| first(scene, &ray));
+        assert!(a.is_some() && a == b && a == c, "{ray:?}");
     }
 }

@@ -6,12 +6,12 @@ use abbe::geometry::{Aggregate, Buffer, Departures, Hit, Instance, Mesh, MeshRep
 use glam::{DAffine3, DVec3};
 
 /// A mesh without attributes.
-pub(crate) fn polygons<'a>(points: &[[f32; 3]], counts: &'a [i32], indices: &'a [i32]) -> PolygonMesh<'a> {
+pub(crate) fn polygons<'a>(points: &[[f32; 3]], counts: &'a [i32], indices: &[i32]) -> PolygonMesh<'a> {
     PolygonMesh {
         path: "/Mesh",
         points: Buffer::from_vec(points.to_vec()),
         counts,
-        indices,
+        indices: Buffer::from_vec(indices.to_vec()),
         holes: &[],
         left_handed: false,
         normals: None,

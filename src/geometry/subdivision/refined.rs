@@ -28,7 +28,7 @@ impl Primvar {
 pub(in super::super) struct Refined {
     points: Buffer<[f32; 3]>,
     counts: Vec<i32>,
-    indices: Vec<i32>,
+    indices: Buffer<i32>,
     holes: Vec<i32>,
     normals: Primvar,
     uv: Option<Primvar>,
@@ -58,7 +58,7 @@ impl Refined {
         Self {
             points: Buffer::from_vec(points),
             counts: vec![refiner.face_size() as i32; faces],
-            indices: corners.iter().map(|&i| i as i32).collect(),
+            indices: Buffer::from_vec(corners.iter().map(|&i| i as i32).collect()),
             holes: (0..faces).filter(is_hidden).map(|face| face as i32).collect(),
             normals: Primvar {
                 values: Buffer::from_vec(normals),
@@ -83,7 +83,7 @@ impl Refined {
             path: control.path,
             points: self.points.clone(),
             counts: &self.counts,
-            indices: &self.indices,
+            indices: self.indices.clone(),
             holes: &self.holes,
             left_handed: control.left_handed,
             normals: Some(self.normals.view()),

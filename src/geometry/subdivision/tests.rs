@@ -58,7 +58,7 @@ impl Cage {
             path: "/Cage",
             points: Buffer::from_vec(self.points.clone()),
             counts: &counts,
-            indices: &indices,
+            indices: Buffer::from_vec(indices),
             holes: &[],
             left_handed: false,
             normals: None,
