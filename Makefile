@@ -87,7 +87,7 @@ test-python: $(EXTENSION) $(WHEEL)
 
 $(OLDEST)/.stamp: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m venv $(OLDEST)
-	$(OLDEST)/bin/python -m pip install --quiet --only-binary :all: usd-core==$(OLDEST_USD) 'numpy>=1.26' 'pytest>=8'
+	$(OLDEST)/bin/python -m pip install --quiet --only-binary :all: usd-core==$(OLDEST_USD) 'numpy>=1.26' 'openimageio>=3.0' 'pillow>=10' 'pytest>=8'
 	@touch $@
 
 # All that meets USD. Its wheels end with Python 3.12; on a later one this is skipped, and says so.

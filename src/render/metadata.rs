@@ -164,8 +164,13 @@ fn matrices(camera: &Camera) -> ([f32; 16], [f32; 16]) {
 /// A fingerprint of everything that decides the pixels but the part of them that is rendered.
 fn settings_hash(scene: &Scene, plan: &Plan) -> String {
     let layers: Vec<_> = plan.layers.iter().map(|layer| (&layer.name, layer.aov.name)).collect();
+    let mut camera = scene.document().cameras[plan.camera].clone();
+    // A scene file keeps motion that this render has no use for, and that a stage would not have been asked for.
+    if plan.shutter.is_none() && !plan.motion_vectors {
+        camera.motion = None;
+    }
     let decisive = json!({
-        "camera": scene.document().cameras[plan.camera],
+        "camera": camera,
         "resolution": plan.resolution,
         "pixelAspectRatio": plan.pixel_aspect_ratio,
         "depthOfField": plan.depth_of_field,

@@ -126,6 +126,8 @@ def test_bindings_have_usd_s_strength_and_unused_materials_are_not_read():
     ("purposes", "expected", "inherits"),
     [
         ('["full", ""]', "Full", "World"),
+        # As Houdini writes it.
+        ('["full", "allPurpose"]', "Full", "World"),
         ('["preview", ""]', "Preview", "World"),
         ('["preview", "full", ""]', "Preview", "World"),
         ('["none", "full", "preview"]', "Full", None),

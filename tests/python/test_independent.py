@@ -1,5 +1,6 @@
 """Values in the EXR against a computation of the same pixels that shares no code with the product (`mp_oracle`)."""
 
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -125,22 +126,15 @@ def relative_error(value: list[float], expected: Any) -> float:
 
 
 def channel_wavelengths() -> list[float]:
-    """Centroids of the positive parts of the Rec.709 responses: CIE 1931 as fitted by Wyman, Sloan and Shirley 2013,
-    with the textbook's matrix."""
+    """Centroids of the positive parts of the Rec.709 responses, by colour-science's observer and matrix."""
+    with warnings.catch_warnings():
+        # It tells which of its own optional parts are missing.
+        warnings.simplefilter("ignore")
+        import colour
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
     x = np.arange(360, 830.01, 0.05)
-
-    def lobe(height: float, centre: float, left: float, right: float) -> Any:
-        return height * np.exp(-0.5 * ((x - centre) / np.where(x < centre, left, right)) ** 2)
-
-    xyz = np.array(
-        [
-            lobe(1.056, 599.8, 37.9, 31.0) + lobe(0.362, 442.0, 16.0, 26.7) + lobe(-0.065, 501.1, 20.4, 26.2),
-            lobe(0.821, 568.8, 46.9, 40.5) + lobe(0.286, 530.9, 16.3, 31.1),
-            lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8),
-        ]
-    )
-    rgb_from_xyz = [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560]]
-    rgb = np.maximum([*rgb_from_xyz, [0.0556434, -0.2040259, 1.0572252]] @ xyz, 0)
+    xyz = np.array([np.interp(x, observer.wavelengths, values) for values in observer.values.T])
+    rgb = np.maximum(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB @ xyz, 0)
     return list(rgb @ x / rgb.sum(axis=1))
 
 

@@ -348,4 +348,6 @@ def rendered_purposes(wanted: Sequence[str] | None, settings: Any) -> frozenset[
 def binding_purposes(settings: Any) -> Sequence[str]:
     """Return the material purposes in the order in which they count: the settings', else full and all-purpose."""
     authored = None if settings is None else token_list(settings, tokens.MATERIAL_BINDING_PURPOSES)
-    return tokens.BINDING_PURPOSES if authored is None else authored
+    if authored is None:
+        return tokens.BINDING_PURPOSES
+    return ["" if purpose == tokens.ALL_PURPOSE_ALIAS else purpose for purpose in authored]

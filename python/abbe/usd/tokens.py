@@ -108,6 +108,8 @@ MATERIAL_BINDING: Final = "material:binding"
 COLLECTION: Final = "collection"
 # The all-purpose binding has no name.
 BINDING_PURPOSES: Final = ("full", "")
+# What Houdini writes for the purpose whose token is empty.
+ALL_PURPOSE_ALIAS: Final = "allPurpose"
 OUTPUTS_PREFIX: Final = "outputs:"
 INPUTS: Final = "inputs"
 INPUTS_PREFIX: Final = "inputs:"
