@@ -46,6 +46,8 @@ $(BIN)/python:
 $(TOOLS): pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
 	$(BIN)/python -m pip install --quiet --group dev
+# An optics package as a second opinion on lenses. Its ray trace imports these two; the rest of what it asks for is a desktop.
+	$(BIN)/python -m pip install --quiet --no-deps rayoptics==0.9.8 opticalglass==1.1.1 transforms3d==0.4.2
 	@touch $@
 
 # Editable: a change of a Python file needs no installation.
