@@ -15,10 +15,12 @@
 //! | [`optics`] | n(λ) and its derivatives, absorption, media and their priorities |
 //! | [`ray`] | columns, transfer, scattering, footprint, chromatic motion: the calculus |
 //! | [`geometry`] | shapes, instances, trees, hits |
+//! | [`bsdf`] | how surfaces scatter light |
 //! | [`light`] | what shines: shapes, spectra, profiles |
 //! | [`texture`] | images, colour spaces, what is computed of them |
 //! | [`camera`], [`sampler`] | where rays begin |
 //! | [`scene`] | the description, its checks, the compiled scene |
+//! | [`lighting`] | the lights of a view: choosing one, a point of it, what a ray meets of them |
 //! | [`film`] | the AOV table, layers, sums independent of grouping |
 //! | [`integrator`] | what is computed for a pixel; the plug-in point |
 //! | [`render`] | settings, plan, tiles, progress, statistics |
@@ -28,6 +30,7 @@
 //! Imports go down this table only from its bottom up: a layer knows those above it (`tests/architecture.rs`).
 
 mod atomic;
+pub mod bsdf;
 pub mod camera;
 pub mod compare;
 pub mod diagnostics;
@@ -37,6 +40,7 @@ pub mod film;
 pub mod geometry;
 pub mod integrator;
 pub mod light;
+pub mod lighting;
 pub mod math;
 pub mod optics;
 pub mod ray;

@@ -7,11 +7,15 @@ pub mod color;
 pub mod illuminant;
 pub mod lines;
 pub mod observer;
+pub mod reflectance;
 pub mod response;
+pub mod sampled;
 mod tables;
 pub mod uplift;
+pub mod visible;
 mod wavelength;
 
+pub use sampled::{LANES, SampledSpectrum, Wavelengths};
 pub use wavelength::Wavelength;
 
 /// Reference wavelength λ_ref of every AOV unless settings say otherwise: the d line, so that the index there is n_d.

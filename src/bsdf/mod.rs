@@ -1,0 +1,212 @@
+//! How a surface scatters light, at the wavelengths of a path.
+//!
+//! Conventions: everything is in the local frame of the shading normal, z along it on the side of `wo`; `wo` and `wi` are
+//! unit vectors away from the surface, to where the path came from and where it goes; cos θ = z. `f` is in 1/sr. Radiometry is
+//! f32. A [`Parameters`] says what the surface is made of at a point; a [`Bsdf`] is made of it and evaluated, sampled.
+//!
+//! Smooth interfaces (delta lobes) only say what happens, with what probability and weight: where a mirrored or refracted ray goes
+//! is the calculus' business ([`crate::ray`], f64).
+
+use glam::Vec3;
+
+use crate::spectrum::SampledSpectrum;
+
+/// What a surface is made of at a point, after OpenPBR: a coat over a base that is metal, opaque dielectric or
+/// transmissive dielectric, with sheen on top. Everything is already at the path's wavelengths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameters<const N: usize> {
+    /// Albedo of the diffuse base, its weight included.
+    pub base_color: SampledSpectrum<N>,
+    /// Roughness of the diffuse base, 0 Lambert to 1 (Oren–Nayar family).
+    pub diffuse_roughness: f32,
+    /// Share of the base that is metal, 0..=1.
+    pub metalness: f32,
+    /// What the metal reflects.
+    pub metal: Metal<N>,
+    /// Weight of the dielectric's specular reflection, 0..=1 and beyond as OpenPBR has it.
+    pub specular_weight: f32,
+    /// Tint of the dielectric's specular reflection.
+    pub specular_color: SampledSpectrum<N>,
+    /// GGX α along the tangent and across it; below [`SMOOTH_ALPHA`] the interface is smooth.
+    pub alpha: [f32; 2],
+    /// Indices on the side of `wo` and on the other side, at every wavelength, of the dielectric base.
+    pub interface: Interface<N>,
+    /// Share of the dielectric base that transmits, 0..=1.
+    pub transmission: f32,
+    /// Tint of what is transmitted at the surface.
+    pub transmission_tint: SampledSpectrum<N>,
+    /// The surface is a wall of its own: light passes straight, and is reflected between its faces.
+    pub thin_walled: bool,
+    /// Clear coat.
+    pub coat: Option<Coat<N>>,
+    /// Sheen on top of everything.
+    pub sheen: Option<Sheen<N>>,
+    /// Film on the base's interface.
+    pub film: Option<Film>,
+}
+
+/// What a metal reflects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Metal<const N: usize> {
+    /// By its complex index n + ik.
+    Index {
+        /// n
+        n: SampledSpectrum<N>,
+        /// k
+        k: SampledSpectrum<N>,
+    },
+    /// By its reflectance at normal incidence and the tint at 82° (generalised Schlick of OpenPBR: "F82-tint").
+    Tint {
+        /// Reflectance at normal incidence.
+        f0: SampledSpectrum<N>,
+        /// Multiplies Schlick's reflectance near 82°; 1 is Schlick.
+        f82: SampledSpectrum<N>,
+    },
+}
+
+/// The indices of two media that meet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interface<const N: usize> {
+    /// On the side of `wo`.
+    pub ior_i: SampledSpectrum<N>,
+    /// On the other side.
+    pub ior_t: SampledSpectrum<N>,
+}
+
+/// A clear coat.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coat<const N: usize> {
+    /// How much of the surface it covers, 0..=1.
+    pub weight: f32,
+    /// Transmittance of its colour for light that goes in and out at normal incidence.
+    pub color: SampledSpectrum<N>,
+    /// Its index.
+    pub ior: f32,
+    /// GGX α along the tangent and across it.
+    pub alpha: [f32; 2],
+}
+
+/// Sheen: fibres over everything.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sheen<const N: usize> {
+    /// 0..=1.
+    pub weight: f32,
+    /// Its colour.
+    pub color: SampledSpectrum<N>,
+    /// 0..=1.
+    pub roughness: f32,
+}
+
+/// A thin film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Film {
+    /// Share of the surface that has it, 0..=1.
+    pub weight: f32,
+    /// Thickness, nm.
+    pub thickness_nm: f32,
+    /// Its index.
+    pub ior: f32,
+}
+
+/// A GGX lobe narrower than this is treated as smooth: α = 0.03², as `scene::material::SMOOTH_ROUGHNESS`.
+pub const SMOOTH_ALPHA: f32 = 0.0009;
+
+/// What kind of event a sample is: for parts of the beauty, light path expressions and ray-depth limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// Diffuse reflection (or diffuse transmission).
+    Diffuse,
+    /// Reflection by a rough interface.
+    GlossyReflection,
+    /// Transmission by a rough interface.
+    GlossyTransmission,
+    /// Reflection by a smooth interface.
+    SpecularReflection,
+    /// Refraction by a smooth interface.
+    SpecularTransmission,
+    /// Straight through: a thin wall.
+    Straight,
+}
+
+/// Where a sample goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scattered {
+    /// To this unit vector of the local frame.
+    Toward(Vec3),
+    /// Mirrored by the smooth interface.
+    Mirror,
+    /// Refracted by the smooth interface, at the hero wavelength.
+    Refract,
+    /// Straight on.
+    Straight,
+}
+
+/// A direction drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BsdfSample<const N: usize> {
+    /// Where it goes.
+    pub scattered: Scattered,
+    /// What happened.
+    pub event: Event,
+    /// f |cos θ| / pdf, the pdf being the hero's; for smooth lobes weight over probability.
+    pub weight: SampledSpectrum<N>,
+    /// Density per solid angle with which each lane, were it the hero, would have drawn the direction; of smooth lobes the
+    /// probability of the branch. Equal in all lanes unless a rough interface disperses.
+    pub pdf: SampledSpectrum<N>,
+}
+
+/// A BSDF's values for a pair of directions; smooth lobes are not in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evaluated<const N: usize> {
+    /// f |cos θ_i| of what is diffuse.
+    pub diffuse: SampledSpectrum<N>,
+    /// f |cos θ_i| of rough interfaces, reflected or transmitted by the side of `wi`.
+    pub glossy: SampledSpectrum<N>,
+    /// As [`BsdfSample::pdf`].
+    pub pdf: SampledSpectrum<N>,
+}
+
+/// A BSDF at a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Bsdf<const N: usize> {
+    parameters: Parameters<N>,
+}
+
+impl<const N: usize> Bsdf<N> {
+    /// Of what the surface is made of there.
+    pub fn new(parameters: &Parameters<N>) -> Self {
+        Self { parameters: *parameters }
+    }
+
+    /// Whether every lobe is smooth: then light sampling has nothing to add.
+    pub fn is_smooth(&self) -> bool {
+        false
+    }
+
+    /// Draws a direction; `None` where the light is absorbed. `u_lobe` chooses the lobe, `u` the direction.
+    pub fn sample(&self, wo: Vec3, _u_lobe: f32, [u, v]: [f32; 2]) -> Option<BsdfSample<N>> {
+        if wo.z <= 0.0 {
+            return None;
+        }
+        let r = u.sqrt();
+        let phi = 2.0 * std::f32::consts::PI * v;
+        let wi = Vec3::new(r * libm::cosf(phi), r * libm::sinf(phi), (1.0 - u).max(0.0).sqrt());
+        let pdf = wi.z * std::f32::consts::FRAC_1_PI;
+        (pdf > 0.0).then_some(BsdfSample {
+            scattered: Scattered::Toward(wi),
+            event: Event::Diffuse,
+            weight: self.parameters.base_color,
+            pdf: SampledSpectrum::splat(pdf),
+        })
+    }
+
+    /// The values for a pair of directions.
+    pub fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluated<N> {
+        let pdf = if wo.z > 0.0 { wi.z.max(0.0) * std::f32::consts::FRAC_1_PI } else { 0.0 };
+        Evaluated {
+            diffuse: self.parameters.base_color * pdf,
+            glossy: SampledSpectrum::ZERO,
+            pdf: SampledSpectrum::splat(pdf),
+        }
+    }
+}
