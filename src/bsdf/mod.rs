@@ -23,7 +23,8 @@ pub struct Parameters<const N: usize> {
     pub metalness: f32,
     /// What the metal reflects.
     pub metal: Metal<N>,
-    /// Weight of the dielectric's specular reflection, 0..=1 and beyond as OpenPBR has it.
+    /// Factor of the dielectric's reflectance at normal incidence, 0..=1 and beyond, by way of its index as OpenPBR has it; 1 where
+    /// the index of `interface` was changed for it already, as it is for what transmits. 0: no interface.
     pub specular_weight: f32,
     /// Tint of the dielectric's specular reflection.
     pub specular_color: SampledSpectrum<N>,
@@ -43,6 +44,57 @@ pub struct Parameters<const N: usize> {
     pub sheen: Option<Sheen<N>>,
     /// Film on the base's interface.
     pub film: Option<Film>,
+    /// Albedo with which the opaque base transmits diffusely, beside `base_color`; with it their sum should not exceed 1.
+    pub diffuse_transmission: SampledSpectrum<N>,
+    /// Where given, the dielectric over an opaque base reflects by Schlick's law from this reflectance at normal incidence
+    /// to white at grazing, in place of Fresnel's law (UsdPreviewSurface, glTF).
+    pub schlick_f0: Option<SampledSpectrum<N>>,
+}
+
+impl<const N: usize> Default for Parameters<N> {
+    /// Grey Lambert: albedo ½, nothing specular.
+    fn default() -> Self {
+        Self {
+            base_color: SampledSpectrum::splat(0.5),
+            diffuse_roughness: 0.0,
+            metalness: 0.0,
+            metal: Metal::Tint { f0: SampledSpectrum::ONE, f82: SampledSpectrum::ONE },
+            specular_weight: 0.0,
+            specular_color: SampledSpectrum::ONE,
+            alpha: [0.0; 2],
+            interface: Interface { ior_i: SampledSpectrum::ONE, ior_t: SampledSpectrum::splat(1.5) },
+            transmission: 0.0,
+            transmission_tint: SampledSpectrum::ONE,
+            thin_walled: false,
+            coat: None,
+            sheen: None,
+            film: None,
+            diffuse_transmission: SampledSpectrum::ZERO,
+            schlick_f0: None,
+        }
+    }
+}
+
+impl<const N: usize> Parameters<N> {
+    /// Lambert of this albedo.
+    pub fn diffuse(color: SampledSpectrum<N>) -> Self {
+        Self { base_color: color, ..Self::default() }
+    }
+
+    /// Lambert of this albedo under a dielectric interface.
+    pub fn plastic(color: SampledSpectrum<N>, interface: Interface<N>, alpha: f32) -> Self {
+        Self { base_color: color, specular_weight: 1.0, interface, alpha: [alpha; 2], ..Self::default() }
+    }
+
+    /// A dielectric interface that light passes.
+    pub fn glass(interface: Interface<N>, alpha: f32) -> Self {
+        Self { transmission: 1.0, specular_weight: 1.0, interface, alpha: [alpha; 2], ..Self::default() }
+    }
+
+    /// A metal.
+    pub fn metal(metal: Metal<N>, alpha: f32) -> Self {
+        Self { metalness: 1.0, metal, specular_weight: 1.0, alpha: [alpha; 2], ..Self::default() }
+    }
 }
 
 /// What a metal reflects.
@@ -84,6 +136,15 @@ pub struct Coat<const N: usize> {
     pub ior: f32,
     /// GGX α along the tangent and across it.
     pub alpha: [f32; 2],
+    /// Share of the darkening by light reflected between coat and base that is shown, 0..=1 (OpenPBR; 1 is physical).
+    pub darkening: f32,
+}
+
+impl<const N: usize> Default for Coat<N> {
+    /// Smooth, clear and complete, of index 1.5.
+    fn default() -> Self {
+        Self { weight: 1.0, color: SampledSpectrum::ONE, ior: 1.5, alpha: [0.0; 2], darkening: 1.0 }
+    }
 }
 
 /// Sheen: fibres over everything.

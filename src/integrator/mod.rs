@@ -10,6 +10,7 @@ pub mod differentials;
 mod screen_motion;
 mod search;
 pub mod transmittance;
+mod walk;
 
 use std::ops::Range;
 use std::sync::Arc;
