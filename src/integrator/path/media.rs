@@ -54,8 +54,7 @@ pub(super) struct Medium<const N: usize> {
 
 impl<const N: usize> Medium<N> {
     /// Outside of everything.
-    const OUTSIDE: Self =
-        Self { ior: 1.0, iors: SampledSpectrum::ONE, absorption: None, is_dispersive: false };
+    const OUTSIDE: Self = Self { ior: 1.0, iors: SampledSpectrum::ONE, absorption: None, is_dispersive: false };
 
     /// The index for the calculus.
     pub(super) fn jet(&self) -> IorJet {

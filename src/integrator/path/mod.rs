@@ -5,19 +5,23 @@
 //! Next-event estimation and the directions of the BSDFs are combined by the balance heuristic, over all wavelengths that could have
 //! made the path. All other AOVs are those of `differentials`, in the same pass and with the same bits.
 
+use std::ops::Range;
+
 mod frame;
 mod media;
+mod surface;
 mod tracer;
 
 use super::chain::{Counters, Follower};
 use super::differentials::{self, Differentials};
 use super::{Integrator, PreparedIntegrator, Task, Worker};
 use crate::error::Result;
-use crate::film::aov::{AOVS, Aov, COLOR};
+use crate::film::aov::{AOVS, Aov, Family};
 use crate::film::pixel::PixelAccumulator;
-use crate::film::sensor::Sensor;
 use crate::lighting::Lighting;
+use crate::spectrum::sensor;
 use crate::spectrum::{LANES, visible};
+use glam::{DMat3, DVec3};
 use media::Laws;
 use tracer::Tracer;
 
@@ -50,22 +54,17 @@ struct Prepared<'a> {
     laws: Laws<'a>,
     /// Everything that is no light; `None` if nothing of it is asked for.
     others: Option<differentials::Prepared<'a>>,
-    /// Layers of the beauty.
-    color: Vec<usize>,
 }
 
 impl<'a> Prepared<'a> {
     fn new(task: &'a Task<'a>) -> Result<Self> {
-        let layers = |name: &str| (0..task.aovs.len()).filter(|&i| task.aovs[i].name == name).collect::<Vec<_>>();
-        let color = layers(COLOR);
-        let has_others = color.len() < task.aovs.len();
+        let has_others = task.aovs.iter().any(|aov| aov.family != Family::Transport);
         Ok(Self {
             task,
             follower: Follower::of_camera(task.view, task.camera),
             lighting: Lighting::new(task.view)?,
             laws: Laws::new(task.view.scene, task.optics.dispersion_scale)?,
             others: if has_others { Some(Differentials::prepared(task)?) } else { None },
-            color,
         })
     }
 }
@@ -85,7 +84,7 @@ struct PathWorker<'a, const N: usize, const DISPERSIVE: bool> {
     prepared: &'a Prepared<'a>,
     tracer: Tracer<'a, N, DISPERSIVE>,
     others: Option<Box<dyn differentials::SampleWorker + 'a>>,
-    sensor: Sensor,
+    color_from_xyz: DMat3,
 }
 
 impl<'a, const N: usize, const DISPERSIVE: bool> PathWorker<'a, N, DISPERSIVE> {
@@ -94,15 +93,15 @@ impl<'a, const N: usize, const DISPERSIVE: bool> PathWorker<'a, N, DISPERSIVE> {
             prepared,
             tracer: Tracer::new(prepared.task.view, &prepared.follower, &prepared.lighting, &prepared.laws),
             others: prepared.others.as_ref().map(|others| others.sample_worker()),
-            sensor: Sensor::default(),
+            color_from_xyz: prepared.task.color_space.from_xyz(),
         }
     }
 }
 
 impl<const N: usize, const DISPERSIVE: bool> Worker for PathWorker<'_, N, DISPERSIVE> {
-    fn render(&mut self, pixel: [i32; 2], out: &mut PixelAccumulator) {
+    fn render(&mut self, pixel: [i32; 2], range: Range<u32>, out: &mut PixelAccumulator) {
         let task = self.prepared.task;
-        for index in task.samples.begin..task.samples.end {
+        for index in range {
             let place = task.sampler.sample(pixel, index);
             if let Some(others) = &mut self.others {
                 others.sample(&place, out);
@@ -110,10 +109,8 @@ impl<const N: usize, const DISPERSIVE: bool> Worker for PathWorker<'_, N, DISPER
             let mut numbers = task.sampler.path(pixel, index);
             let wavelengths = visible::sample::<N>(numbers.wavelength());
             let seen = self.tracer.trace(&task.camera.ray(&place), wavelengths, &mut numbers);
-            let [r, g, b] = self.sensor.rgb(seen.radiance, &wavelengths);
-            for &layer in &self.prepared.color {
-                out.add(layer, Some([r, g, b, f64::from(seen.alpha)]));
-            }
+            let DVec3 { x, y, z } = self.color_from_xyz * sensor::xyz(seen.radiance, &wavelengths);
+            out.add_color([x, y, z, f64::from(seen.alpha)]);
         }
     }
 

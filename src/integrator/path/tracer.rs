@@ -10,14 +10,18 @@ use glam::{DVec3, Vec3};
 
 use super::frame::Frame;
 use super::media::{Laws, PathMedia};
+use super::surface;
 use crate::bsdf::{Bsdf, Interface, Scattered};
+use crate::geometry::Ray;
 use crate::integrator::chain::{Counters, Follower};
 use crate::integrator::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
 use crate::light::Light;
 use crate::lighting::{LightHit, LightSample, Lighting, Receiver};
+use crate::optics::media::MediumId;
 use crate::ray::{RayStart, ScatterKind, mirror, refract_or_reflect};
 use crate::sampler::PathSampler;
 use crate::scene::view::View;
+use crate::spectrum::reflectance::Reflectance;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
 
 /// From this vertex on roulette may end a path.
@@ -72,7 +76,7 @@ impl<const N: usize> State<N> {
             self.radiance += self.throughput * met.radiance * by_lanes;
             return;
         };
-        let pdf = lighting.pdf(&vertex.receiver, direction, met);
+        let pdf = lighting.pdf(&vertex.receiver, direction, met.light, met.distance);
         let mut seen = met.radiance;
         if let Some(light) = lighting.light(met.light)
             && has_factors(light)
@@ -88,6 +92,11 @@ impl<const N: usize> State<N> {
         };
         self.radiance += self.throughput * seen * weight;
     }
+}
+
+/// Where what could block a light at `distance` ends: before its own surface, which is met with the error of many roundings.
+fn before(distance: f64) -> f64 {
+    distance * (1.0 - 1e-9)
 }
 
 /// Whether a light shines on diffuse and specular materials differently from what it is.
@@ -131,12 +140,12 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
             let medium = self.media.of(walk.media.current());
             let ray = walk.ray;
-            self.lighting.met_before(&ray, limit, &wavelengths, &mut |mut light| {
+            if let Some(mut light) = self.lighting.intersect(&ray, limit, &wavelengths) {
                 if let Some(through) = medium.transmittance(light.distance) {
                     light.radiance *= through;
                 }
                 state.meet::<DISPERSIVE>(self.lighting, ray.direction, &light);
-            });
+            }
             let Some(met) = met else {
                 // What absorbs lets nothing through from infinitely far.
                 let absorbs = |sigma: &SampledSpectrum<N>| sigma.0.iter().any(|&sigma| sigma > 0.0);
@@ -175,33 +184,31 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         let inside = self.view.inside(&met.hit, met.material_id);
         let medium = self.media.of(walk.media.current());
         // What lies behind: another medium only where the surface bounds one.
-        let far = inside.map(|_| walk.far_side(met, &mut self.counters));
+        let mut far = inside.map(|_| walk.far_side(met, &mut self.counters));
         let far_medium = far.as_ref().map_or(medium, |far| self.media.of(far.medium));
         let interface = Interface { ior_i: medium.iors, ior_t: far_medium.iors };
-        let at = self.view.surface(&walk.ray, met, &state.wavelengths, interface);
+        let at = surface::at(self.view, &walk.ray, met, &state.wavelengths, interface);
         let way = u64::from(met.hit.instance) << 32 | u64::from(met.hit.primitive);
-        if at.opacity < 1.0 && (at.opacity <= 0.0 || numbers.of(way) >= at.opacity) {
+        if at.presence < 1.0 && (at.presence <= 0.0 || numbers.of(way) >= at.presence) {
             walk.cross(met);
             return true;
         }
-        if let Some(far) = &far
-            && far.medium == walk.media.current()
-        {
+        if let Some(far) = far.take_if(|far| far.medium == walk.media.current()) {
             // The same medium on both sides: no optics.
-            walk.pass(met, far.clone());
+            walk.pass(met, far);
             return true;
         }
         if *vertices == 0 {
             *alpha = 1.0;
         }
         let direction = walk.ray.direction;
-        if let Some(emitted) = self.lighting.emitted(&walk.ray, met, &state.wavelengths) {
+        if let Some(emitted) = self.lighting.emitted(&walk.ray, &met.hit, &state.wavelengths) {
             state.meet::<DISPERSIVE>(self.lighting, direction, &emitted);
         }
         // The shading normal decides how light is scattered, the geometric one which side it is on.
         let toward = |n: DVec3| if direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
         let n_g = toward(met.surface.n_g);
-        let mut normal = toward(at.normal.unwrap_or(met.surface.n_s));
+        let mut normal = toward(at.normal);
         if direction.dot(normal) >= 0.0 {
             normal = n_g;
         }
@@ -223,7 +230,16 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 let local = frame.to_local(light.wi);
                 // A side that the shading normal makes up is not lit.
                 if (local.z > 0.0) == (light.wi.dot(n_g) > 0.0) {
-                    self.add_direct(walk, met, &bsdf, [wo, local], &light, far.as_ref().map(|f| f.medium), state, numbers);
+                    self.add_direct(
+                        walk,
+                        met,
+                        &bsdf,
+                        [wo, local],
+                        &light,
+                        far.as_ref().map(|f| f.medium),
+                        state,
+                        numbers,
+                    );
                 }
             }
         }
@@ -311,7 +327,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         bsdf: &Bsdf<N>,
         [wo, wi]: [Vec3; 2],
         light: &LightSample<N>,
-        far: Option<Option<crate::optics::media::MediumId>>,
+        far: Option<Option<MediumId>>,
         state: &mut State<N>,
         numbers: &PathSampler,
     ) {
@@ -346,7 +362,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         met: &SurfacePoint,
         light: &LightSample<N>,
         source: Option<&Light>,
-        far: Option<Option<crate::optics::media::MediumId>>,
+        far: Option<Option<MediumId>>,
         state: &State<N>,
         numbers: &PathSampler,
     ) -> Option<SampledSpectrum<N>> {
@@ -363,16 +379,16 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         let set = source.and_then(|light| light.shadowed_by);
         let mut departures = walk.departures;
         departures.depart(&walk.ray, &met.hit, light.wi.dot(met.surface.n_g) > 0.0);
-        let ray = crate::geometry::Ray { origin: met.point, direction: light.wi, ..walk.ray };
+        let ray = Ray { origin: met.point, direction: light.wi, ..walk.ray };
         self.counters.rays += 1;
         let natural = shadow.is_none_or(|shadow| shadow.is_natural());
         let mut nearest = f64::INFINITY;
         let (view, wavelengths) = (self.view, &state.wavelengths);
-        let is_blocked = view.aggregate.is_blocked(&ray, &departures, light.distance_to_block(), |hit| {
+        let is_blocked = view.aggregate.is_blocked(&ray, &departures, before(light.distance), |hit| {
             if set.is_some_and(|set| !view.scene.is_linked(set, hit.instance)) {
                 return false;
             }
-            match view.blocking(&ray, hit, wavelengths, numbers) {
+            match surface::through(view, hit, wavelengths, numbers) {
                 None => false,
                 Some(part) if part.is_black() => {
                     nearest = nearest.min(hit.distance);
@@ -392,7 +408,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         {
             // What is seen in full shadow is the light times the shadow's colour.
             let strength = shadow.strength(nearest) as f32;
-            let color = crate::spectrum::reflectance::Reflectance::of_color(shadow.color.map(|c| c as f32));
+            let color = Reflectance::of_color(shadow.color.map(|c| c as f32));
             let dark = color.at(wavelengths);
             through *= SampledSpectrum::splat(1.0 - strength) + dark * strength;
         }
