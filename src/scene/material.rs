@@ -27,7 +27,7 @@ pub use appearance::{Appearance, Below, Opacity};
 use dialect::{Glass, Response, Surface};
 use law::{Authored, StatedAbsorption};
 use network::Networks;
-pub(in crate::scene) use resources::Resources;
+pub(in crate::scene) use resources::{Resources, source};
 use values::Values;
 
 /// From this weight on a surface counts as what the weight says: transmissive, metallic, present.
