@@ -7,109 +7,13 @@
 //! Smooth interfaces (delta lobes) only say what happens, with what probability and weight: where a mirrored or refracted ray goes
 //! is the calculus' business ([`crate::ray`], f64).
 
+mod parameters;
+
 use glam::Vec3;
 
 use crate::spectrum::SampledSpectrum;
 
-/// What a surface is made of at a point, after OpenPBR: a coat over a base that is metal, opaque dielectric or
-/// transmissive dielectric, with sheen on top. Everything is already at the path's wavelengths.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameters<const N: usize> {
-    /// Albedo of the diffuse base, its weight included.
-    pub base_color: SampledSpectrum<N>,
-    /// Roughness of the diffuse base, 0 Lambert to 1 (Oren–Nayar family).
-    pub diffuse_roughness: f32,
-    /// Share of the base that is metal, 0..=1.
-    pub metalness: f32,
-    /// What the metal reflects.
-    pub metal: Metal<N>,
-    /// Weight of the dielectric's specular reflection, 0..=1 and beyond as OpenPBR has it.
-    pub specular_weight: f32,
-    /// Tint of the dielectric's specular reflection.
-    pub specular_color: SampledSpectrum<N>,
-    /// GGX α along the tangent and across it; below [`SMOOTH_ALPHA`] the interface is smooth.
-    pub alpha: [f32; 2],
-    /// Indices on the side of `wo` and on the other side, at every wavelength, of the dielectric base.
-    pub interface: Interface<N>,
-    /// Share of the dielectric base that transmits, 0..=1.
-    pub transmission: f32,
-    /// Tint of what is transmitted at the surface.
-    pub transmission_tint: SampledSpectrum<N>,
-    /// The surface is a wall of its own: light passes straight, and is reflected between its faces.
-    pub thin_walled: bool,
-    /// Clear coat.
-    pub coat: Option<Coat<N>>,
-    /// Sheen on top of everything.
-    pub sheen: Option<Sheen<N>>,
-    /// Film on the base's interface.
-    pub film: Option<Film>,
-}
-
-/// What a metal reflects.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Metal<const N: usize> {
-    /// By its complex index n + ik.
-    Index {
-        /// n
-        n: SampledSpectrum<N>,
-        /// k
-        k: SampledSpectrum<N>,
-    },
-    /// By its reflectance at normal incidence and the tint at 82° (generalised Schlick of OpenPBR: "F82-tint").
-    Tint {
-        /// Reflectance at normal incidence.
-        f0: SampledSpectrum<N>,
-        /// Multiplies Schlick's reflectance near 82°; 1 is Schlick.
-        f82: SampledSpectrum<N>,
-    },
-}
-
-/// The indices of two media that meet.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interface<const N: usize> {
-    /// On the side of `wo`.
-    pub ior_i: SampledSpectrum<N>,
-    /// On the other side.
-    pub ior_t: SampledSpectrum<N>,
-}
-
-/// A clear coat.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coat<const N: usize> {
-    /// How much of the surface it covers, 0..=1.
-    pub weight: f32,
-    /// Transmittance of its colour for light that goes in and out at normal incidence.
-    pub color: SampledSpectrum<N>,
-    /// Its index.
-    pub ior: f32,
-    /// GGX α along the tangent and across it.
-    pub alpha: [f32; 2],
-}
-
-/// Sheen: fibres over everything.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sheen<const N: usize> {
-    /// 0..=1.
-    pub weight: f32,
-    /// Its colour.
-    pub color: SampledSpectrum<N>,
-    /// 0..=1.
-    pub roughness: f32,
-}
-
-/// A thin film.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Film {
-    /// Share of the surface that has it, 0..=1.
-    pub weight: f32,
-    /// Thickness, nm.
-    pub thickness_nm: f32,
-    /// Its index.
-    pub ior: f32,
-}
-
-/// A GGX lobe narrower than this is treated as smooth: α = 0.03², as `scene::material::SMOOTH_ROUGHNESS`.
-pub const SMOOTH_ALPHA: f32 = 0.0009;
+pub use parameters::{Coat, Film, Interface, Metal, Parameters, SMOOTH_ALPHA, Sheen};
 
 /// What kind of event a sample is: for parts of the beauty, light path expressions and ray-depth limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,6 +4,8 @@
 //! All derivatives are taken at the reference wavelength. Where no refraction of the chain has a dispersive medium they
 //! are 0 and valid; on a miss those of position are absent; a chain without an end has none at all.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 
 use super::chain::{Chain, Counters, End, Follower, Record, SurfacePoint};
@@ -35,7 +37,7 @@ impl Integrator for Differentials {
     }
 
     fn aovs(&self) -> Vec<&'static Aov> {
-        AOVS.iter().collect()
+        AOVS.iter().filter(|aov| aov.family != Family::Transport).collect()
     }
 
     fn prepare<'a>(&self, task: &'a Task<'a>) -> Result<Box<dyn PreparedIntegrator + 'a>> {
@@ -187,9 +189,9 @@ struct Carrier<'a, C> {
 }
 
 impl<C: ColumnSet> Worker for Carrier<'_, C> {
-    fn render(&mut self, pixel: [i32; 2], out: &mut PixelAccumulator) {
+    fn render(&mut self, pixel: [i32; 2], range: Range<u32>, out: &mut PixelAccumulator) {
         let task = self.prepared.task;
-        for index in task.samples.begin..task.samples.end {
+        for index in range {
             self.sample(&task.sampler.sample(pixel, index), out);
         }
     }

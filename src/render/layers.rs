@@ -29,8 +29,8 @@ const DEFAULT_AOVS: &[&str] = &[
     "material_id",
 ];
 
-/// The name of the beauty, whose channels stand bare.
-const BEAUTY: &str = "color";
+/// The beauty, whose channels stand bare.
+const BEAUTY: &str = aov::COLOR;
 
 /// Parameters of a RenderVar's driver that are understood, with those that have no meaning here by their usual value.
 const VAR_PARAMETERS: &[&str] = &["name", "format", "channel_prefix", "clearValue", "multiSampled"];
@@ -53,7 +53,7 @@ fn aov_name<S: serde::Serializer>(aov: &&'static Aov, serializer: S) -> Result<S
 
 impl PlannedLayer {
     fn plain(aov: &'static Aov) -> Self {
-        Self { aov, name: layer_name(aov.name, aov.name, ""), half: false }
+        Self { aov, name: layer_name(aov.name, aov.name, ""), half: aov.is_half_by_default() }
     }
 }
 
@@ -85,7 +85,6 @@ pub(super) fn layers(
     };
     let unavailable = |name: &str| match aov::find(name) {
         Some(_) => format!("the integrator '{chosen}' has no '{name}'"),
-        None if aov::canonical_name(name) == BEAUTY => format!("the integrator '{chosen}' has no '{name}'"),
         None => format!("the integrator '{chosen}' has no AOV '{name}'; `abbe aovs` lists what there is"),
     };
     let mut layers: Vec<PlannedLayer> = Vec::new();
@@ -186,6 +185,8 @@ fn is_half(var: &Var, aov: &Aov, diagnostics: &mut Diagnostics) -> bool {
             false
         }
         SampleType::Float if wants_half && aov.is_sound_in_half() => true,
+        // `dataType` alone does not tell: color3f is what the schema says where nobody says anything.
+        SampleType::Float if format.is_empty() && aov.is_half_by_default() => true,
         SampleType::Float => {
             if wants_half {
                 refuse("half-format", "asks for half floats, which lose what a derivative is for: FLOAT is written");

@@ -10,6 +10,7 @@ pub mod observer;
 pub mod reflectance;
 pub mod response;
 pub mod sampled;
+pub mod sensor;
 mod tables;
 pub mod uplift;
 pub mod visible;
