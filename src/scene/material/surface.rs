@@ -32,6 +32,10 @@ pub(super) struct Layers {
     pub(super) specular_weight: Register,
     pub(super) specular_color: Register,
     pub(super) alpha: [Register; 2],
+    /// Reflectance at normal incidence of the dielectric over an opaque base, if that follows Schlick's law.
+    pub(super) schlick_f0: Option<Register>,
+    /// Albedo of what is transmitted diffusely.
+    pub(super) diffuse_transmission: Register,
     /// Index of the dielectric where the media do not state it.
     pub(super) ior: Register,
     pub(super) transmission: Register,
@@ -68,6 +72,8 @@ pub(super) struct CoatLayer {
     pub(super) color: Register,
     pub(super) ior: Register,
     pub(super) alpha: [Register; 2],
+    /// Share of the darkening by light between coat and base.
+    pub(super) darkening: Register,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -96,6 +102,8 @@ impl Layers {
             specular_weight: zero,
             specular_color: white,
             alpha: [one; 2],
+            schlick_f0: None,
+            diffuse_transmission: zero,
             ior: one,
             transmission: zero,
             transmission_tint: white,
@@ -279,6 +287,8 @@ pub struct Surface {
     specular_weight: Number,
     specular_color: Tint,
     alpha: [Number; 2],
+    schlick_f0: Option<Tint>,
+    diffuse_transmission: Tint,
     index: Index,
     transmission: Number,
     transmission_tint: Tint,
@@ -298,6 +308,7 @@ struct SurfaceCoat {
     color: Tint,
     ior: Number,
     alpha: [Number; 2],
+    darkening: Number,
 }
 
 /// What a surface is at a hit, at the wavelengths of a path.
@@ -401,6 +412,7 @@ impl Surface {
             color: c.tint(coat.color),
             ior: c.number(coat.ior, 1.0, HIGHEST_INDEX),
             alpha: coat.alpha.map(|alpha| c.share(alpha)),
+            darkening: c.share(coat.darkening),
         });
         let sheen = layers.sheen.map(|s| (c.share(s.weight), c.tint(s.color), c.share(s.roughness)));
         let film = layers.film.map(|film| {
@@ -415,6 +427,8 @@ impl Surface {
             None => Emission::Of(Source::LookedUp(c.result(layers.emission))),
         };
         let transmission = c.share(layers.transmission);
+        // Without an inside, light that passes goes straight on.
+        let thin_walled = layers.thin_walled || (!matches!(index, IndexOf::Media) && !transmission.is_zero());
         let index = match index {
             IndexOf::Media => Index::Media,
             IndexOf::Wall(dispersion) => Index::Wall(dispersion.clone()),
@@ -429,10 +443,12 @@ impl Surface {
             specular_weight: c.number(layers.specular_weight, 0.0, f32::MAX),
             specular_color: c.tint(layers.specular_color),
             alpha: layers.alpha.map(|alpha| c.share(alpha)),
+            schlick_f0: layers.schlick_f0.map(|f0| c.tint(f0)),
+            diffuse_transmission: c.tint(layers.diffuse_transmission),
             index,
             transmission,
             transmission_tint: if transmission.is_zero() { Tint::White } else { c.tint(layers.transmission_tint) },
-            thin_walled: layers.thin_walled,
+            thin_walled,
             coat: coat.filter(|coat| !coat.weight.is_zero()),
             sheen: sheen.filter(|(weight, color, _)| !weight.is_zero() && *color != Tint::Black),
             film: film.filter(|[weight, thickness, _]| !weight.is_zero() && !thickness.is_zero()),
@@ -493,6 +509,7 @@ impl Surface {
                 color: tint(&coat.color),
                 ior: coat.ior.at(results),
                 alpha: pair(&coat.alpha),
+                darkening: coat.darkening.at(results),
             }),
             sheen: self.sheen.as_ref().map(|(weight, color, roughness)| Sheen {
                 weight: weight.at(results),
@@ -503,7 +520,10 @@ impl Surface {
                 weight: weight.at(results),
                 thickness_nm: thickness.at(results),
                 ior: ior.at(results),
+                nanometers: SampledSpectrum::from_fn(|lane| wavelengths.nanometers()[lane] as f32),
             }),
+            diffuse_transmission: tint(&self.diffuse_transmission),
+            schlick_f0: self.schlick_f0.as_ref().map(tint),
         };
         let emission = match self.emission {
             Emission::None => [0.0; 3],

@@ -7,7 +7,7 @@ use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
 use super::super::painter::{Painted, Painter};
-use super::super::surface::{CoatLayer, Layers, MetalLayer, SheenLayer, anisotropic, index_of, isotropic};
+use super::super::surface::{CoatLayer, Layers, MetalLayer, SheenLayer, anisotropic, isotropic};
 use super::Dialect;
 #[cfg(test)]
 use super::inputs::Declared;
@@ -59,8 +59,9 @@ impl Dialect for DisneyPrincipled {
     fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
         let color = p.color(BASE_COLOR)?;
         let (specular, range) = (p.number(SPECULAR)?, p.constant(0.08)?);
-        let f0 = p.multiply(specular, range)?;
+        let intensity = p.multiply(specular, range)?;
         let (white, tint) = (p.gray(1.0)?, p.number(SPECULAR_TINT)?);
+        let tint = p.mix(white, color, tint)?;
         let (sheen, sheen_tint) = (p.number(SHEEN)?, p.number(SHEEN_TINT)?);
         let gloss = p.number(CLEARCOAT_GLOSS)?;
         let coat_roughness = p.one_minus(gloss)?;
@@ -69,15 +70,16 @@ impl Dialect for DisneyPrincipled {
             color: white,
             ior: p.constant(1.5)?,
             alpha: isotropic(coat_roughness, p)?,
+            darkening: p.constant(0.0)?,
         };
         let (roughness, anisotropy) = (p.number(ROUGHNESS)?, p.number(ANISOTROPIC)?);
         let sheen_layer =
             SheenLayer { weight: sheen, color: p.mix(white, color, sheen_tint)?, roughness: p.constant(0.3)? };
-        let ior = index_of(f0, p)?;
+        let ior = p.number(IOR)?;
         Ok(Layers {
             metalness: p.number(METALLIC)?,
             metal: MetalLayer::Tint { f0: color, f82: white },
-            specular_color: p.mix(white, color, tint)?,
+            schlick_f0: Some(p.multiply(tint, intensity)?),
             alpha: anisotropic(roughness, anisotropy, p)?,
             transmission: p.number(TRANSMISSION)?,
             transmission_tint: color,

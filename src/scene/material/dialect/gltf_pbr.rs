@@ -8,7 +8,7 @@ use crate::error::Result;
 
 use super::super::appearance::{Below, OpacityInput};
 use super::super::painter::{Painted, Painter};
-use super::super::surface::{CoatLayer, FilmLayer, Layers, MetalLayer, SheenLayer, f0_of, index_of, isotropic};
+use super::super::surface::{CoatLayer, FilmLayer, Layers, MetalLayer, SheenLayer, f0_of, isotropic};
 use super::super::{Context, THRESHOLD};
 use super::Dialect;
 #[cfg(test)]
@@ -110,23 +110,19 @@ impl Dialect for GltfPbr {
 
     fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
         let color = p.color(BASE_COLOR)?;
-        // F0 = min(((1 − n)/(1 + n))² specular_color, 1): its greatest component is the index's, the others are a tint.
-        let (ior, specular_color) = (p.number(IOR)?, p.color(SPECULAR_COLOR)?);
-        let [strongest, _] = p.extremes(specular_color)?;
-        let (tint, ior) = match p.b().value(strongest) {
-            Some([1.0, ..]) => (specular_color, ior),
-            _ => {
-                let (f0, tiny) = (f0_of(ior, p)?, p.constant(f32::MIN_POSITIVE)?);
-                let (f0, divisor) = (p.multiply(f0, strongest)?, p.max(strongest, tiny)?);
-                (p.divide(specular_color, divisor)?, index_of(f0, p)?)
-            }
-        };
+        // F0 = min(((1 − n)/(1 + n))² specular_color, 1) specular.
+        let (ior, specular, specular_color) = (p.number(IOR)?, p.number(SPECULAR)?, p.color(SPECULAR_COLOR)?);
+        let f0 = f0_of(ior, p)?;
+        let (f0, white) = (p.multiply(specular_color, f0)?, p.gray(1.0)?);
+        let f0 = p.min(f0, white)?;
+        let f0 = p.multiply(f0, specular)?;
         let clearcoat_roughness = p.number(CLEARCOAT_ROUGHNESS)?;
         let coat = CoatLayer {
             weight: p.number(CLEARCOAT)?,
             color: p.gray(1.0)?,
             ior: p.constant(1.5)?,
             alpha: isotropic(clearcoat_roughness, p)?,
+            darkening: p.constant(0.0)?,
         };
         let sheen_roughness = p.number(SHEEN_ROUGHNESS)?;
         let sheen = SheenLayer {
@@ -146,13 +142,11 @@ impl Dialect for GltfPbr {
         let along = p.mix(alpha, one, strength)?;
         let (radians, turns) = (p.number(ANISOTROPY_ROTATION)?, p.constant(std::f32::consts::TAU.recip())?);
         let (strength, emissive) = (p.number(EMISSIVE_STRENGTH)?, p.color(EMISSIVE)?);
-        let white = p.gray(1.0)?;
         let thickness = p.number(THICKNESS)?;
         Ok(Layers {
             metalness: p.number(METALLIC)?,
             metal: MetalLayer::Tint { f0: color, f82: white },
-            specular_weight: p.number(SPECULAR)?,
-            specular_color: tint,
+            schlick_f0: Some(f0),
             alpha: [along, alpha],
             transmission: p.number(TRANSMISSION)?,
             transmission_tint: color,

@@ -159,6 +159,7 @@ impl Dialect for OmniSurface {
             color: p.color(COAT_COLOR)?,
             ior: p.number(COAT_IOR)?,
             alpha: isotropic(coat_roughness, p)?,
+            darkening: p.constant(0.0)?,
         };
         let sheen = SheenLayer {
             weight: p.number(SHEEN_WEIGHT)?,

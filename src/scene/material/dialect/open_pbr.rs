@@ -39,6 +39,7 @@ const SPECULAR_COLOR: Color = input("specular_color", [1.0; 3]);
 const ANISOTROPY: Number = input("specular_roughness_anisotropy", 0.0);
 const SUBSURFACE_WEIGHT: Number = input("subsurface_weight", 0.0);
 const SUBSURFACE_COLOR: Color = input("subsurface_color", [0.8; 3]);
+const SUBSURFACE_ANISOTROPY: Number = input("subsurface_scatter_anisotropy", 0.0);
 const FUZZ_WEIGHT: Number = input("fuzz_weight", 0.0);
 const FUZZ_COLOR: Color = input("fuzz_color", [1.0; 3]);
 const FUZZ_ROUGHNESS: Number = input("fuzz_roughness", 0.5);
@@ -46,6 +47,7 @@ const COAT_WEIGHT: Number = input("coat_weight", 0.0);
 const COAT_COLOR: Color = input("coat_color", [1.0; 3]);
 const COAT_ROUGHNESS: Number = input("coat_roughness", 0.0);
 const COAT_ANISOTROPY: Number = input("coat_roughness_anisotropy", 0.0);
+const COAT_DARKENING: Number = input("coat_darkening", 1.0);
 const COAT_IOR: Number = input("coat_ior", 1.6);
 const FILM_WEIGHT: Number = input("thin_film_weight", 0.0);
 const FILM_THICKNESS: Number = input("thin_film_thickness", 0.5);
@@ -119,6 +121,7 @@ impl Dialect for OpenPbr {
             color: p.color(COAT_COLOR)?,
             ior: p.number(COAT_IOR)?,
             alpha: stretched(coat_roughness, coat_anisotropy, p)?,
+            darkening: p.number(COAT_DARKENING)?,
         };
         let (subsurface_color, subsurface) = (p.color(SUBSURFACE_COLOR)?, p.number(SUBSURFACE_WEIGHT)?);
         let (micrometers, nanometers) = (p.number(FILM_THICKNESS)?, p.constant(1000.0)?);
@@ -134,7 +137,20 @@ impl Dialect for OpenPbr {
         };
         let ior = p.number(IOR)?;
         let (luminance, emission) = (p.number(EMISSION_LUMINANCE)?, p.color(EMISSION_COLOR)?);
-        let diffuse = p.mix(base, subsurface_color, subsurface)?;
+        let thin_walled = p.switch(THIN_WALLED);
+        let (diffuse, diffuse_transmission) = match thin_walled {
+            // Under a thin wall half of it, more by its anisotropy, comes out on the other side (section 3.9).
+            true => {
+                let (anisotropy, half) = (p.number(SUBSURFACE_ANISOTROPY)?, p.constant(0.5)?);
+                let forward = p.multiply(anisotropy, half)?;
+                let (forward, weighted) = (p.add(forward, half)?, p.multiply(subsurface_color, subsurface)?);
+                let (backward, zero) = (p.one_minus(forward)?, p.constant(0.0)?);
+                let reflected = p.multiply(weighted, backward)?;
+                let rest = p.mix(base, zero, subsurface)?;
+                (p.add(rest, reflected)?, p.multiply(weighted, forward)?)
+            }
+            false => (p.mix(base, subsurface_color, subsurface)?, p.constant(0.0)?),
+        };
         Ok(Layers {
             diffuse_roughness: p.number(DIFFUSE_ROUGHNESS)?,
             metalness: p.number(METALNESS)?,
@@ -143,7 +159,8 @@ impl Dialect for OpenPbr {
             alpha,
             transmission: p.number(TRANSMISSION)?,
             transmission_tint: surface_tint(COLOR, DEPTH, p)?,
-            thin_walled: p.switch(THIN_WALLED),
+            thin_walled,
+            diffuse_transmission,
             coat: Some(coat),
             sheen: Some(sheen),
             film: Some(film),

@@ -10,7 +10,7 @@ use crate::texture::Register;
 use super::super::THRESHOLD;
 use super::super::appearance::{Below, OpacityInput};
 use super::super::painter::{Painted, Painter};
-use super::super::surface::{CoatLayer, Layers, MetalLayer, index_of, isotropic};
+use super::super::surface::{CoatLayer, Layers, MetalLayer, f0_of, isotropic};
 #[cfg(test)]
 use super::inputs::Declared;
 use super::inputs::{Color, Inputs, Number, Switch, Word, input};
@@ -92,16 +92,18 @@ impl Dialect for PreviewSurface {
         let below = if threshold > 0.0 || is_presence { Below::CutOut } else { Below::Glass };
         Ok(Some(OpacityInput { name: OPACITY.name, limit, below, is_color: false }))
     }
-    /// Metallic workflow: F0 = ((1 − ior)/(1 + ior))² under white, the metal reflects its albedo at every angle.
+    /// Specular workflow: F0 is the specular colour. Metallic workflow: F0 = ((1 − ior)/(1 + ior))² under white, the metal reflects its albedo at every angle.
     fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
         let (color, ior) = (p.color(DIFFUSE_COLOR)?, p.number(IOR)?);
         let alpha = isotropic(p.number(ROUGHNESS)?, p)?;
         let (presence, transmission) = presence_and_transmission(p)?;
+        let coat_roughness = p.number(CLEARCOAT_ROUGHNESS)?;
         let coat = CoatLayer {
             weight: p.number(CLEARCOAT)?,
             color: p.gray(1.0)?,
             ior,
-            alpha: isotropic(p.number(CLEARCOAT_ROUGHNESS)?, p)?,
+            alpha: isotropic(coat_roughness, p)?,
+            darkening: p.constant(0.0)?,
         };
         let layers = Layers {
             alpha,
@@ -113,9 +115,14 @@ impl Dialect for PreviewSurface {
             ..Layers::plastic(color, ior, p)?
         };
         if p.switch(USE_SPECULAR_WORKFLOW) {
-            return specular_workflow(layers, p);
+            return Ok(Layers { schlick_f0: Some(p.color(SPECULAR_COLOR)?), ..layers });
         }
-        Ok(Layers { metalness: p.number(METALLIC)?, metal: MetalLayer::Flat(color), ..layers })
+        Ok(Layers {
+            schlick_f0: Some(f0_of(ior, p)?),
+            metalness: p.number(METALLIC)?,
+            metal: MetalLayer::Flat(color),
+            ..layers
+        })
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {
@@ -134,23 +141,4 @@ fn presence_and_transmission(p: &mut Painter<'_, '_, '_>) -> Painted<(Register, 
         "presence" => Ok((opacity, zero)),
         _ => Ok((one, p.one_minus(opacity)?)),
     }
-}
-
-/// F0 is a colour, F90 white. Schlick's reflectance is linear in F0, so it is that of a dielectric with the least
-/// component r of F0 beside a metal with the share w = (max F0 − r)/(1 − r) and f₀ = (F0 − (1 − w) r)/w.
-fn specular_workflow(layers: Layers, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
-    let specular = p.color(SPECULAR_COLOR)?;
-    let specular = p.clamp(specular, 0.0, 1.0)?;
-    let [most, least] = p.extremes(specular)?;
-    let (excess, rest) = (p.subtract(most, least)?, p.one_minus(least)?);
-    let tiny = p.constant(f32::MIN_POSITIVE)?;
-    let rest = p.max(rest, tiny)?;
-    let share = p.divide(excess, rest)?;
-    let dielectric = p.one_minus(share)?;
-    let dielectric = p.multiply(dielectric, least)?;
-    let above = p.subtract(specular, dielectric)?;
-    let divisor = p.max(share, tiny)?;
-    let (f0, white) = (p.divide(above, divisor)?, p.gray(1.0)?);
-    let ior = index_of(least, p)?;
-    Ok(Layers { ior, metalness: share, metal: MetalLayer::Tint { f0, f82: white }, ..layers })
 }

@@ -121,13 +121,19 @@ impl Dialect for StandardSurface {
             color: p.color(COAT_COLOR)?,
             ior: p.number(COAT_IOR)?,
             alpha: anisotropic(coat_roughness, coat_anisotropy, p)?,
+            darkening: p.constant(0.0)?,
         };
         let (subsurface_color, subsurface) = (p.color(SUBSURFACE_COLOR)?, p.number(SUBSURFACE)?);
         let affected = coat_gamma(coat, p)?;
         let diffuse = saturated(color, affected, p)?;
         let diffuse = p.multiply(diffuse, weight)?;
         let below = saturated(subsurface_color, affected, p)?;
-        let diffuse = p.mix(diffuse, below, subsurface)?;
+        let (thin_walled, zero) = (p.switch(THIN_WALLED), p.constant(0.0)?);
+        let (diffuse, diffuse_transmission) = match thin_walled {
+            // Under a thin wall all of it comes out on the other side.
+            true => (p.mix(diffuse, zero, subsurface)?, p.multiply(below, subsurface)?),
+            false => (p.mix(diffuse, below, subsurface)?, zero),
+        };
         let sheen = SheenLayer {
             weight: p.number(SHEEN)?,
             color: p.color(SHEEN_COLOR)?,
@@ -150,7 +156,8 @@ impl Dialect for StandardSurface {
             alpha: anisotropic(roughness, anisotropy, p)?,
             transmission,
             transmission_tint: surface_tint(COLOR, DEPTH, p)?,
-            thin_walled: p.switch(THIN_WALLED),
+            thin_walled,
+            diffuse_transmission,
             coat: Some(coat_layer),
             sheen: Some(sheen),
             film: Some(film),
