@@ -7,6 +7,7 @@
 pub mod chain;
 mod counters;
 pub mod differentials;
+pub mod path;
 mod screen_motion;
 mod search;
 pub mod transmittance;
@@ -171,7 +172,7 @@ pub struct Registry {
 impl Default for Registry {
     /// The integrators of this crate.
     fn default() -> Self {
-        Self { integrators: vec![Arc::new(differentials::Differentials)] }
+        Self { integrators: vec![Arc::new(differentials::Differentials), Arc::new(path::Path)] }
     }
 }
 
