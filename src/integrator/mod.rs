@@ -7,9 +7,13 @@
 pub mod chain;
 mod counters;
 pub mod differentials;
+mod frame;
+mod lanes;
 pub mod path;
+pub mod reference;
 mod screen_motion;
 mod search;
+mod surface;
 pub mod transmittance;
 mod walk;
 
@@ -172,7 +176,7 @@ pub struct Registry {
 impl Default for Registry {
     /// The integrators of this crate.
     fn default() -> Self {
-        Self { integrators: vec![Arc::new(differentials::Differentials), Arc::new(path::Path)] }
+        Self { integrators: vec![Arc::new(differentials::Differentials), Arc::new(path::Path), Arc::new(reference::Reference)] }
     }
 }
 

@@ -7,9 +7,6 @@
 
 use std::ops::Range;
 
-mod frame;
-mod media;
-mod surface;
 mod tracer;
 
 use super::chain::{Counters, Follower};
@@ -22,7 +19,7 @@ use crate::lighting::Lighting;
 use crate::spectrum::sensor;
 use crate::spectrum::{LANES, visible};
 use glam::{DMat3, DVec3};
-use media::Laws;
+use super::lanes::Laws;
 use tracer::Tracer;
 
 /// The integrator; it has no settings of its own.

@@ -8,12 +8,12 @@
 
 use glam::{DVec3, Vec3};
 
-use super::frame::Frame;
-use super::media::{Laws, PathMedia};
-use super::surface;
 use crate::bsdf::{Bsdf, Interface, Scattered};
 use crate::geometry::Ray;
 use crate::integrator::chain::{Counters, Follower};
+use crate::integrator::frame::Frame;
+use crate::integrator::lanes::{Laws, PathMedia};
+use crate::integrator::surface;
 use crate::integrator::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
 use crate::light::Light;
 use crate::lighting::{LightHit, LightSample, Lighting, Receiver};
