@@ -150,8 +150,7 @@ impl<'a> BruteForce<'a> {
             let frame = at.tangent.map_or_else(|| Frame::about(n_s), |tangent| Frame::along(n_s, tangent));
             let wo = frame.to_local(-ray.direction);
             let bsdf = Bsdf::new(&at.parameters);
-            let receiver =
-                Receiver { point: met.point, normal: None, object: met.hit.instance, time: ray.time };
+            let receiver = Receiver { point: met.point, normal: None, object: met.hit.instance, time: ray.time };
             if let Some(light) = lighting.sample(&receiver, wavelengths, u_light, [u_x, u_y])
                 && light.is_delta
             {

@@ -1,14 +1,12 @@
-//! What a ray has met, as the path tracer needs it: the surface's parameters with its normal and tangent in render space.
+//! What a ray has met, as light transport needs it: the surface's parameters with its normal and tangent in render space.
 
 use glam::DVec3;
 
-use crate::bsdf::{Interface, Metal, Parameters};
+use super::walk::SurfacePoint;
+use crate::bsdf::{Interface, Parameters};
 use crate::geometry::{Hit, Ray};
-use crate::integrator::walk::SurfacePoint;
 use crate::sampler::PathSampler;
-use crate::scene::material::Kind;
-use crate::scene::view::{Presence, View};
-use crate::spectrum::reflectance::Reflectance;
+use crate::scene::view::View;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
 
 /// A surface at a point.
@@ -34,37 +32,22 @@ pub(super) fn at<const N: usize>(
     wavelengths: &Wavelengths<N>,
     interface: Interface<N>,
 ) -> Met<N> {
-    let color = view.albedo(&met.hit, met.material_id).map(|c| c as f32);
-    let color = Reflectance::of_color(color).at(wavelengths);
-    let kind = met.material_id.checked_sub(1).map(|i| &view.scene.materials[i as usize].kind);
-    let parameters = match kind {
-        _ if met.presence == Presence::Opaque => Parameters::diffuse(color),
-        Some(Kind::Dielectric { thin_walled, .. }) => {
-            Parameters { thin_walled: *thin_walled, ..Parameters::glass(interface, 0.0) }
-        }
-        Some(Kind::Mirror { .. }) => Parameters::metal(Metal::Tint { f0: color, f82: SampledSpectrum::ONE }, 0.0),
-        _ => Parameters::diffuse(color),
-    };
+    let at = view.surface(&met.hit, met.material_id, wavelengths, interface);
+    let parameters = at.parameters;
     Met {
         parameters,
-        presence: if met.presence == Presence::Absent { 0.0 } else { 1.0 },
+        presence: at.presence,
         normal: met.surface.n_s,
         tangent: None,
-        transmits: parameters.transmission > 0.0,
+        transmits: parameters.transmission > 0.0 || !parameters.diffuse_transmission.is_black(),
     }
 }
 
 /// What a surface in the way of sampled light lets through; `None`: everything.
-pub(super) fn through<const N: usize>(
-    view: &View<'_>,
-    hit: &Hit,
-    _wavelengths: &Wavelengths<N>,
-    numbers: &PathSampler,
-) -> Option<SampledSpectrum<N>> {
-    let id = view.material_id(hit);
-    let _ = numbers;
-    match view.presence(hit, id) {
-        Presence::Absent => None,
-        _ => Some(SampledSpectrum::ZERO),
-    }
+///
+/// `numbers` decides for each surface by itself whether a share of it is there.
+pub(super) fn through<const N: usize>(view: &View<'_>, hit: &Hit, numbers: &PathSampler) -> Option<SampledSpectrum<N>> {
+    let share = view.share_present(hit, view.material_id(hit));
+    let is_there = share >= 1.0 || numbers.of(u64::from(hit.instance) << 32 | u64::from(hit.primitive)) < share;
+    is_there.then_some(SampledSpectrum::ZERO)
 }

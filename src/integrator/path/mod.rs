@@ -11,6 +11,7 @@ mod tracer;
 
 use super::chain::{Counters, Follower};
 use super::differentials::{self, Differentials};
+use super::lanes::Laws;
 use super::{Integrator, PreparedIntegrator, Task, Worker};
 use crate::error::Result;
 use crate::film::aov::{AOVS, Aov, Family};
@@ -19,7 +20,6 @@ use crate::lighting::Lighting;
 use crate::spectrum::sensor;
 use crate::spectrum::{LANES, visible};
 use glam::{DMat3, DVec3};
-use super::lanes::Laws;
 use tracer::Tracer;
 
 /// The integrator; it has no settings of its own.

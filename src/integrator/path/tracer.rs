@@ -284,7 +284,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 ((scattering.momentum_out / ior).normalize(), passes)
             }
             Scattered::Straight => {
-                // No vertex: light that was sampled comes through as well.
+                state.vertex = None;
                 walk.cross(met);
                 return self.survives(state, *vertices, u_roulette);
             }
@@ -388,7 +388,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             if set.is_some_and(|set| !view.scene.is_linked(set, hit.instance)) {
                 return false;
             }
-            match surface::through(view, hit, wavelengths, numbers) {
+            match surface::through::<N>(view, hit, numbers) {
                 None => false,
                 Some(part) if part.is_black() => {
                     nearest = nearest.min(hit.distance);
