@@ -9,7 +9,7 @@ use super::request::Request;
 use super::settings::Attributes;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::film::aov::{self, Aov, SampleType};
+use crate::film::aov::{self, Aov, Family, SampleType};
 use crate::integrator::Registry;
 use crate::scene::description::{Product, Var};
 
@@ -75,7 +75,10 @@ pub(super) fn layers(
 ) -> Result<(String, Vec<PlannedLayer>)> {
     let chosen = match &request.integrator {
         Some(name) => name.clone(),
-        None => attributes.text("abbe:integrator")?.filter(|name| !name.is_empty()).unwrap_or("differentials".into()),
+        None => match attributes.text("abbe:integrator")?.filter(|name| !name.is_empty()) {
+            Some(name) => name,
+            None => default_integrator(request, product).to_owned(),
+        },
     };
     let integrator = registry.find(&chosen)?;
     let offered = integrator.aovs();
@@ -137,6 +140,16 @@ pub(super) fn layers(
         }
     }
     Ok((chosen, layers))
+}
+
+/// The integrator that nobody chose: with light transport if some AOV asks for light.
+fn default_integrator(request: &Request, product: Option<&Product>) -> &'static str {
+    let is_light = |name: &str| aov::find(name).is_some_and(|aov| aov.family == Family::Transport);
+    let asks = match &request.aovs {
+        Some(names) => names.iter().any(|name| is_light(name)),
+        None => product.is_some_and(|p| p.vars.iter().any(|var| source(var).is_ok_and(is_light))),
+    };
+    if asks { "path" } else { "differentials" }
 }
 
 fn text<'a>(var: &'a Var, name: &str) -> &'a str {

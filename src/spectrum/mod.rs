@@ -4,6 +4,7 @@
 
 pub mod blackbody;
 pub mod color;
+mod fit;
 pub mod illuminant;
 pub mod lines;
 pub mod observer;
