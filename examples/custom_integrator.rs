@@ -7,6 +7,7 @@
 //! cargo run --release --example custom_integrator -- scene.safetensors cosine.exr
 //! ```
 
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -66,9 +67,9 @@ struct PerThread<'a> {
 }
 
 impl Worker for PerThread<'_> {
-    fn render(&mut self, pixel: [i32; 2], out: &mut PixelAccumulator) {
+    fn render(&mut self, pixel: [i32; 2], range: Range<u32>, out: &mut PixelAccumulator) {
         let Prepared { task, follower } = self.prepared;
-        for index in task.samples.begin..task.samples.end {
+        for index in range {
             let start = task.camera.ray(&task.sampler.sample(pixel, index));
             let met = follower.first_surface(&start, &mut self.counters);
             out.add(0, met.map(|met| [start.direction.dot(met.surface.n_g).abs()]));

@@ -1,7 +1,9 @@
 //! Where in the pixel, on the lens and in the shutter's time samples are taken: decided by (pixel, sample index, seed) alone.
 //!
 //! Dimensions of the Sobol' sequence: 0, 1 the position in the pixel (x right, y down); 2, 3 the point on the lens, from one
-//! call with them; 4 the time.
+//! call with them; 4 the time; 5 the wavelength; from 8 on, by fours, what the vertices of a path need. Owen-scrambled per
+//! pixel and dimension (B. Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020): the first 2ⁿ samples of a pixel are
+//! stratified in every dimension, so that neither subsets nor growing numbers of samples lose by it.
 
 use crate::error::{Error, Result};
 
@@ -10,6 +12,56 @@ pub const MAX_SAMPLES: u32 = 1 << 16;
 
 /// The Sobol' dimension of the time.
 const TIME: u32 = 4;
+
+/// The Sobol' dimension of the wavelength.
+const WAVELENGTH: u32 = 5;
+
+/// The first group of four dimensions that paths use.
+const FIRST_GROUP: u32 = 2;
+
+/// Groups of four dimensions that `sobol_burley` has; after them numbers are independent.
+const GROUPS: u32 = sobol_burley::NUM_DIMENSIONS / 4;
+
+/// The numbers of one path after its camera ray, four at a time.
+#[derive(Clone, Copy, Debug)]
+pub struct PathSampler {
+    index: u32,
+    seed: u64,
+    group: u32,
+}
+
+impl PathSampler {
+    /// The place of the hero wavelength, 0..1: stratified over the pixel's samples.
+    pub fn wavelength(&self) -> f64 {
+        sobol_burley::sample(self.index, WAVELENGTH, self.folded()).into()
+    }
+
+    /// Four numbers in 0..1, the next of the path.
+    #[inline]
+    pub fn next(&mut self) -> [f32; 4] {
+        let group = self.group;
+        self.group += 1;
+        if group < GROUPS {
+            return sobol_burley::sample_4d(self.index, group, self.folded());
+        }
+        let mut state = hash(self.seed ^ (u64::from(self.index) << 32 | u64::from(group)));
+        std::array::from_fn(|_| {
+            state = hash(state);
+            // 24 bits fill the mantissa: never 1.
+            (state >> 40) as f32 * (1.0 / 16_777_216.0)
+        })
+    }
+
+    /// A number in 0..1 for something that has a number of its own on the way: independent of all others.
+    pub fn of(&self, what: u64) -> f32 {
+        let state = hash(self.seed ^ hash(what ^ (u64::from(self.index) << 32 | u64::from(self.group))));
+        (state >> 40) as f32 * (1.0 / 16_777_216.0)
+    }
+
+    fn folded(&self) -> u32 {
+        (self.seed ^ (self.seed >> 32)) as u32
+    }
+}
 
 /// Everything that a camera ray depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +108,20 @@ impl Sampler {
         Self { over_time, ..self }
     }
 
+    /// The numbers of the path that sample `index` of `pixel` begins.
+    pub fn path(&self, pixel: [i32; 2], index: u32) -> PathSampler {
+        PathSampler { index, seed: self.pixel_seed(pixel), group: FIRST_GROUP }
+    }
+
+    /// Independent numbers for the path that sample `index` of `pixel` begins: nothing of them is stratified.
+    pub fn independent(&self, pixel: [i32; 2], index: u32) -> PathSampler {
+        PathSampler { index, seed: hash(self.pixel_seed(pixel)), group: GROUPS }
+    }
+
+    fn pixel_seed(&self, pixel: [i32; 2]) -> u64 {
+        hash(self.seed ^ (u64::from(pixel[0] as u32) << 32 | u64::from(pixel[1] as u32)))
+    }
+
     /// Sample `index` of `pixel`.
     ///
     /// One sample stands at the centre of everything; more follow an Owen-scrambled Sobol' sequence (Burley 2020), scrambled
@@ -65,7 +131,7 @@ impl Sampler {
         if self.samples == 1 {
             return CameraSample::at(x + 0.5, y + 0.5);
         }
-        let seed = hash(self.seed ^ (u64::from(pixel[0] as u32) << 32 | u64::from(pixel[1] as u32)));
+        let seed = self.pixel_seed(pixel);
         let [dx, dy, u, v] = sobol_burley::sample_4d(index, 0, (seed ^ (seed >> 32)) as u32).map(f64::from);
         let time =
             if self.over_time { sobol_burley::sample(index, TIME, (seed ^ (seed >> 32)) as u32).into() } else { 0.5 };

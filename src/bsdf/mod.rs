@@ -7,109 +7,27 @@
 //! Smooth interfaces (delta lobes) only say what happens, with what probability and weight: where a mirrored or refracted ray goes
 //! is the calculus' business ([`crate::ray`], f64).
 
+mod albedo;
+mod coat;
+mod conductor;
+mod dielectric;
+mod diffuse;
+mod film;
+mod fresnel;
+mod gloss;
+mod microfacet;
+mod parameters;
+mod sheen;
+mod stack;
+
 use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
 
 use crate::spectrum::SampledSpectrum;
+use diffuse::{Diffuse, sample_cosine};
+use stack::Stack;
 
-/// What a surface is made of at a point, after OpenPBR: a coat over a base that is metal, opaque dielectric or
-/// transmissive dielectric, with sheen on top. Everything is already at the path's wavelengths.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameters<const N: usize> {
-    /// Albedo of the diffuse base, its weight included.
-    pub base_color: SampledSpectrum<N>,
-    /// Roughness of the diffuse base, 0 Lambert to 1 (Oren–Nayar family).
-    pub diffuse_roughness: f32,
-    /// Share of the base that is metal, 0..=1.
-    pub metalness: f32,
-    /// What the metal reflects.
-    pub metal: Metal<N>,
-    /// Weight of the dielectric's specular reflection, 0..=1 and beyond as OpenPBR has it.
-    pub specular_weight: f32,
-    /// Tint of the dielectric's specular reflection.
-    pub specular_color: SampledSpectrum<N>,
-    /// GGX α along the tangent and across it; below [`SMOOTH_ALPHA`] the interface is smooth.
-    pub alpha: [f32; 2],
-    /// Indices on the side of `wo` and on the other side, at every wavelength, of the dielectric base.
-    pub interface: Interface<N>,
-    /// Share of the dielectric base that transmits, 0..=1.
-    pub transmission: f32,
-    /// Tint of what is transmitted at the surface.
-    pub transmission_tint: SampledSpectrum<N>,
-    /// The surface is a wall of its own: light passes straight, and is reflected between its faces.
-    pub thin_walled: bool,
-    /// Clear coat.
-    pub coat: Option<Coat<N>>,
-    /// Sheen on top of everything.
-    pub sheen: Option<Sheen<N>>,
-    /// Film on the base's interface.
-    pub film: Option<Film>,
-}
-
-/// What a metal reflects.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Metal<const N: usize> {
-    /// By its complex index n + ik.
-    Index {
-        /// n
-        n: SampledSpectrum<N>,
-        /// k
-        k: SampledSpectrum<N>,
-    },
-    /// By its reflectance at normal incidence and the tint at 82° (generalised Schlick of OpenPBR: "F82-tint").
-    Tint {
-        /// Reflectance at normal incidence.
-        f0: SampledSpectrum<N>,
-        /// Multiplies Schlick's reflectance near 82°; 1 is Schlick.
-        f82: SampledSpectrum<N>,
-    },
-}
-
-/// The indices of two media that meet.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interface<const N: usize> {
-    /// On the side of `wo`.
-    pub ior_i: SampledSpectrum<N>,
-    /// On the other side.
-    pub ior_t: SampledSpectrum<N>,
-}
-
-/// A clear coat.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coat<const N: usize> {
-    /// How much of the surface it covers, 0..=1.
-    pub weight: f32,
-    /// Transmittance of its colour for light that goes in and out at normal incidence.
-    pub color: SampledSpectrum<N>,
-    /// Its index.
-    pub ior: f32,
-    /// GGX α along the tangent and across it.
-    pub alpha: [f32; 2],
-}
-
-/// Sheen: fibres over everything.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sheen<const N: usize> {
-    /// 0..=1.
-    pub weight: f32,
-    /// Its colour.
-    pub color: SampledSpectrum<N>,
-    /// 0..=1.
-    pub roughness: f32,
-}
-
-/// A thin film.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Film {
-    /// Share of the surface that has it, 0..=1.
-    pub weight: f32,
-    /// Thickness, nm.
-    pub thickness_nm: f32,
-    /// Its index.
-    pub ior: f32,
-}
-
-/// A GGX lobe narrower than this is treated as smooth: α = 0.03², as `scene::material::SMOOTH_ROUGHNESS`.
-pub const SMOOTH_ALPHA: f32 = 0.0009;
+pub use parameters::{Coat, Film, Interface, Metal, Parameters, SMOOTH_ALPHA, Sheen};
 
 /// What kind of event a sample is: for parts of the beauty, light path expressions and ray-depth limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,6 +68,9 @@ pub struct BsdfSample<const N: usize> {
     pub event: Event,
     /// f |cos θ| / pdf, the pdf being the hero's; for smooth lobes weight over probability.
     pub weight: SampledSpectrum<N>,
+    /// The part of `weight` that diffuse lobes have; the rest is of rough interfaces. 0 for smooth lobes. A direction is drawn from
+    /// one lobe (`event`) but weighed by all of them: parts of the beauty are exact if they are split by this.
+    pub diffuse: SampledSpectrum<N>,
     /// Density per solid angle with which each lane, were it the hero, would have drawn the direction; of smooth lobes the
     /// probability of the branch. Equal in all lanes unless a rough interface disperses.
     pub pdf: SampledSpectrum<N>,
@@ -166,47 +87,103 @@ pub struct Evaluated<const N: usize> {
     pub pdf: SampledSpectrum<N>,
 }
 
+impl<const N: usize> Evaluated<N> {
+    /// No light goes this way.
+    pub const NOTHING: Self =
+        Self { diffuse: SampledSpectrum::ZERO, glossy: SampledSpectrum::ZERO, pdf: SampledSpectrum::ZERO };
+
+    /// f |cos θ_i|.
+    #[inline]
+    pub fn value(&self) -> SampledSpectrum<N> {
+        self.diffuse + self.glossy
+    }
+}
+
+/// A function of the cosine to the normal, at every wavelength ([`albedo`]).
+type Slices<const N: usize> = [SampledSpectrum<N>; albedo::NODES];
+
 /// A BSDF at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<const N: usize> {
-    parameters: Parameters<N>,
+    kind: Kind<N>,
+}
+
+/// The common surfaces have a short way.
+#[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant, reason = "lives on the stack of one path vertex; a box would allocate per hit")]
+enum Kind<const N: usize> {
+    /// Nothing but diffuse reflection.
+    Diffuse(Diffuse<N>),
+    /// Anything.
+    Stack(Stack<N>),
 }
 
 impl<const N: usize> Bsdf<N> {
     /// Of what the surface is made of there.
     pub fn new(parameters: &Parameters<N>) -> Self {
-        Self { parameters: *parameters }
+        let bare = parameters.specular_weight <= 0.0
+            && parameters.metalness <= 0.0
+            && parameters.transmission <= 0.0
+            && parameters.coat.is_none()
+            && parameters.sheen.is_none()
+            && parameters.diffuse_transmission.is_black();
+        let kind = if bare {
+            Kind::Diffuse(Diffuse::new(parameters.base_color, parameters.diffuse_roughness))
+        } else {
+            Kind::Stack(Stack::new(parameters))
+        };
+        Self { kind }
     }
 
     /// Whether every lobe is smooth: then light sampling has nothing to add.
     pub fn is_smooth(&self) -> bool {
-        false
+        match &self.kind {
+            Kind::Diffuse(_) => false,
+            Kind::Stack(stack) => stack.is_smooth(),
+        }
     }
 
-    /// Draws a direction; `None` where the light is absorbed. `u_lobe` chooses the lobe, `u` the direction.
-    pub fn sample(&self, wo: Vec3, _u_lobe: f32, [u, v]: [f32; 2]) -> Option<BsdfSample<N>> {
+    /// Draws a direction; `None` where the light is absorbed, or `wo` is not above the surface. `u_lobe` chooses the lobe, `u` the
+    /// direction.
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample<N>> {
         if wo.z <= 0.0 {
             return None;
         }
-        let r = u.sqrt();
-        let phi = 2.0 * std::f32::consts::PI * v;
-        let wi = Vec3::new(r * libm::cosf(phi), r * libm::sinf(phi), (1.0 - u).max(0.0).sqrt());
-        let pdf = wi.z * std::f32::consts::FRAC_1_PI;
-        (pdf > 0.0).then_some(BsdfSample {
+        let diffuse = match &self.kind {
+            Kind::Diffuse(diffuse) => diffuse,
+            Kind::Stack(stack) => return stack.sample(wo, u_lobe, u),
+        };
+        let wi = sample_cosine(u);
+        let pdf = wi.z * FRAC_1_PI;
+        if pdf <= 0.0 || diffuse.color.is_black() {
+            return None;
+        }
+        let weight = diffuse.evaluate(wo, wi) * (1.0 / pdf);
+        Some(BsdfSample {
             scattered: Scattered::Toward(wi),
             event: Event::Diffuse,
-            weight: self.parameters.base_color,
+            weight,
+            diffuse: weight,
             pdf: SampledSpectrum::splat(pdf),
         })
     }
 
     /// The values for a pair of directions.
     pub fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluated<N> {
-        let pdf = if wo.z > 0.0 { wi.z.max(0.0) * std::f32::consts::FRAC_1_PI } else { 0.0 };
-        Evaluated {
-            diffuse: self.parameters.base_color * pdf,
-            glossy: SampledSpectrum::ZERO,
-            pdf: SampledSpectrum::splat(pdf),
+        if wo.z <= 0.0 {
+            return Evaluated::NOTHING;
+        }
+        match &self.kind {
+            Kind::Diffuse(_) if wi.z <= 0.0 => Evaluated::NOTHING,
+            Kind::Diffuse(diffuse) => Evaluated {
+                diffuse: diffuse.evaluate(wo, wi),
+                glossy: SampledSpectrum::ZERO,
+                pdf: SampledSpectrum::splat(wi.z * FRAC_1_PI),
+            },
+            Kind::Stack(stack) => stack.evaluate(wo, wi),
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -492,7 +492,7 @@ fn understand(path: &Path, mut attributes: Vec<(String, String, Vec<u8>)>) -> Re
                 format!("layer `{name}` has the AOV `{aov}`, unknown to this version: use the abbe that wrote it"),
             )
         })?;
-        if sums && !row.has_validity {
+        if sums && !row.has_sums() {
             return Err(damaged(path, format!("layer `{name}` cannot have sums")));
         }
         if half && row.sample == SampleType::Uint {

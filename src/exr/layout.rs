@@ -6,7 +6,8 @@
 //! | `<layer>.valid` | fraction of samples with a value |
 //! | `Z` | the values of the first `depth` layer once more, unless a layer has that channel itself |
 //! | `abbe_partial.<layer>.<C>_hi`, `_lo` | upper and lower half of the bits of the f64 sum over the valid samples |
-//! | `abbe_partial.<layer>.count` | number of valid samples |
+//! | `abbe_partial.<layer>.<C>2_hi`, `_lo` | of a variance: the same of the sum of the squares |
+//! | `abbe_partial.<layer>.count` | number of samples in the sums |
 //!
 //! A layer with an empty name has bare channels; in `abbe_partial` it goes by its AOV's name.
 
@@ -170,7 +171,7 @@ pub(super) fn channels(layers: &[LayerKind]) -> Result<Vec<Channel>> {
         if layer.sums {
             let title = layer.title();
             let mut add = |name: String, source| channels.push(Channel { name, sample: Stored::Uint, source });
-            for (component, suffix) in layer.aov.channels.iter().enumerate() {
+            for (component, suffix) in layer.aov.sums().enumerate() {
                 add(format!("{PARTIAL}.{title}.{suffix}_hi"), Source::SumHigh { layer: index, component });
                 add(format!("{PARTIAL}.{title}.{suffix}_lo"), Source::SumLow { layer: index, component });
             }
@@ -214,6 +215,8 @@ pub(super) fn append_row(film: &Film, channel: &Channel, row: usize, out: &mut V
     let stride = layer.aov.channels.len();
     let pixels = row * width..(row + 1) * width;
     let interleaved = |component: usize| pixels.clone().map(move |pixel| pixel * stride + component);
+    let sum_stride = layer.aov.sum_count();
+    let summed = |component: usize| pixels.clone().map(move |pixel| pixel * sum_stride + component);
     // Every other source is a column of 32-bit words.
     fn push(out: &mut Vec<u8>, words: impl Iterator<Item = u32>) {
         words.for_each(|word| out.extend_from_slice(&word.to_ne_bytes()));
@@ -237,10 +240,10 @@ pub(super) fn append_row(film: &Film, channel: &Channel, row: usize, out: &mut V
             push(out, valid[pixels].iter().map(|v| v.to_bits()));
         }
         (Source::SumHigh { component, .. }, Layer { sums: Some(sums), .. }) => {
-            push(out, interleaved(component).map(|i| (sums.values[i].to_bits() >> 32) as u32));
+            push(out, summed(component).map(|i| (sums.values[i].to_bits() >> 32) as u32));
         }
         (Source::SumLow { component, .. }, Layer { sums: Some(sums), .. }) => {
-            push(out, interleaved(component).map(|i| sums.values[i].to_bits() as u32));
+            push(out, summed(component).map(|i| sums.values[i].to_bits() as u32));
         }
         (Source::Count { .. }, Layer { sums: Some(sums), .. }) => push(out, sums.counts[pixels].iter().copied()),
         (source, layer) => unreachable!("layer `{}` has no {source:?}", layer.aov.name),
@@ -258,6 +261,7 @@ pub(super) fn store_row(film: &mut Film, channel: &Channel, row: usize, bytes: &
     let width = film.window.width();
     let layer = &mut film.layers[channel.source.layer()];
     let stride = layer.aov.channels.len();
+    let sum_stride = layer.aov.sum_count();
     let first = row * width;
     let words = bytes.as_chunks::<4>().0.iter().map(|word| u32::from_ne_bytes(*word)).enumerate();
     match (channel.source, layer) {
@@ -279,11 +283,11 @@ pub(super) fn store_row(film: &mut Film, channel: &Channel, row: usize, bytes: &
             words.for_each(|(i, word)| valid[first + i] = f32::from_bits(word));
         }
         (Source::SumHigh { component, .. }, Layer { sums: Some(sums), .. }) => words.for_each(|(i, word)| {
-            let sum = &mut sums.values[(first + i) * stride + component];
+            let sum = &mut sums.values[(first + i) * sum_stride + component];
             *sum = f64::from_bits(sum.to_bits() & 0xffff_ffff | u64::from(word) << 32);
         }),
         (Source::SumLow { component, .. }, Layer { sums: Some(sums), .. }) => words.for_each(|(i, word)| {
-            let sum = &mut sums.values[(first + i) * stride + component];
+            let sum = &mut sums.values[(first + i) * sum_stride + component];
             *sum = f64::from_bits(sum.to_bits() & !0xffff_ffff | u64::from(word));
         }),
         (Source::Count { .. }, Layer { sums: Some(sums), .. }) => {

@@ -14,7 +14,7 @@ use super::{Head, Reader, writer};
 use crate::error::{Error, Result};
 use crate::film::aov::Merge;
 use crate::film::metadata::{Attribute, Metadata};
-use crate::film::sum::{TreeSum, is_aligned, mean, valid_fraction};
+use crate::film::sum::{TreeSum, is_aligned, mean, valid_fraction, variance_of_mean};
 use crate::film::{Film, Layer, SampleRange, Sums, Values, Window};
 
 /// Attributes that tell of a part, not of the render: they may differ between parts and the result does not have them.
@@ -73,7 +73,7 @@ pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<()> {
     }
     let known = first.reader.head();
     let mut layers = known.layers.clone();
-    layers.iter_mut().for_each(|layer| layer.sums = keep_sums && layer.aov.has_validity);
+    layers.iter_mut().for_each(|layer| layer.sums = keep_sums && layer.aov.has_sums());
     let head = Head { window, samples, layers, ..*known };
     let mut metadata = first.reader.metadata().clone();
     metadata.attributes.retain(|(name, _)| !PER_PART.contains(&name.as_str()));
@@ -86,7 +86,7 @@ fn open(path: &Path) -> Result<Part> {
         return Err(Error::file(path, "was interrupted, so pixels are missing in it: render it again"));
     }
     let Head { window, samples, ref layers, .. } = *reader.head();
-    let mut means = layers.iter().filter(|layer| layer.aov.merge == Merge::Mean).peekable();
+    let mut means = layers.iter().filter(|layer| layer.aov.has_sums()).peekable();
     let has_sums =
         means.peek().is_none() && !samples.is_all() || means.peek().is_some() && means.all(|layer| layer.sums);
     Ok(Part { path: path.to_owned(), window, samples, has_sums, reader })
@@ -346,6 +346,20 @@ impl<'a> Span<'a> {
         self.first * n..(self.first + self.pixels) * n
     }
 
+    /// Indices of the interleaved sums.
+    fn sum_components(&self) -> std::ops::Range<usize> {
+        let n = self.layer.aov.sum_count();
+        self.first * n..(self.first + self.pixels) * n
+    }
+
+    /// The value of a layer of counts at pixel `pixel` of the span.
+    fn count(&self, pixel: usize) -> u32 {
+        match &self.layer.values {
+            Values::Uint(values) => values[self.first + pixel],
+            Values::Float(_) => unreachable!("counts are integers"),
+        }
+    }
+
     fn per_pixel(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.pixels
     }
@@ -358,8 +372,8 @@ impl<'a> Span<'a> {
         let (a, b) = (self.components(), other.components());
         let n = self.layer.aov.channels.len();
         let values = match (&self.layer.values, &other.layer.values) {
-            (Values::Float(u), Values::Float(v)) => differs(&u[a.clone()], &v[b.clone()], |x| u64::from(x.to_bits())),
-            (Values::Uint(u), Values::Uint(v)) => differs(&u[a.clone()], &v[b.clone()], |x| u64::from(*x)),
+            (Values::Float(u), Values::Float(v)) => differs(&u[a], &v[b], |x| u64::from(x.to_bits())),
+            (Values::Uint(u), Values::Uint(v)) => differs(&u[a], &v[b], |x| u64::from(*x)),
             _ => Some(0),
         };
         let valid = match (&self.layer.valid, &other.layer.valid) {
@@ -368,12 +382,12 @@ impl<'a> Span<'a> {
         };
         let (sums, counts) = match (&self.layer.sums, &other.layer.sums) {
             (Some(u), Some(v)) => (
-                differs(&u.values[a], &v.values[b], |x| x.to_bits()),
+                differs(&u.values[self.sum_components()], &v.values[other.sum_components()], |x| x.to_bits()),
                 differs(&u.counts[self.per_pixel()], &v.counts[other.per_pixel()], |x| u64::from(*x)),
             ),
             _ => (None, None),
         };
-        [values.map(|i| i / n), valid, sums.map(|i| i / n), counts].into_iter().flatten().min()
+        [values.map(|i| i / n), valid, sums.map(|i| i / self.layer.aov.sum_count()), counts].into_iter().flatten().min()
     }
 }
 
@@ -397,8 +411,17 @@ fn join_span(groups: &[Span<'_>], samples: SampleRange, out: &mut Layer, first: 
             to[pixels.clone()].copy_from_slice(&from[lowest.per_pixel()]);
         }
         if let (Some(to), Some(from)) = (&mut out.sums, &lowest.layer.sums) {
-            to.values[components].copy_from_slice(&from.values[lowest.components()]);
+            let n = out.aov.sum_count();
+            let components = first * n..(first + lowest.pixels) * n;
+            to.values[components].copy_from_slice(&from.values[lowest.sum_components()]);
             to.counts[pixels].copy_from_slice(&from.counts[lowest.per_pixel()]);
+        }
+        return;
+    }
+    if out.aov.merge == Merge::Count {
+        let Values::Uint(to) = &mut out.values else { unreachable!("counts are integers") };
+        for (pixel, to) in to[pixels].iter_mut().enumerate() {
+            *to = groups.iter().map(|span| span.count(pixel)).sum();
         }
         return;
     }
@@ -407,29 +430,34 @@ fn join_span(groups: &[Span<'_>], samples: SampleRange, out: &mut Layer, first: 
         .map(|span| (span, span.layer.sums.as_ref().expect("parts with several ranges were checked to have sums")))
         .collect();
     let covered = samples.end - samples.begin;
+    let sum_count = out.aov.sum_count();
     let mut tree = TreeSum::new(samples.begin);
+    let mut totals = vec![0.0; sum_count];
     for pixel in 0..lowest.pixels {
         let count: u32 = sources.iter().map(|(span, sums)| sums.counts[span.first + pixel]).sum();
-        for component in 0..n {
+        for (component, total) in totals.iter_mut().enumerate() {
             tree.restart(samples.begin);
             for (span, sums) in &sources {
                 tree.push_range(
                     span.samples.end - span.samples.begin,
-                    sums.values[(span.first + pixel) * n + component],
+                    sums.values[(span.first + pixel) * sum_count + component],
                 );
             }
-            let (sum, at) = (tree.total(), (first + pixel) * n + component);
-            if let Values::Float(values) = &mut out.values {
-                values[at] = mean(sum, count);
-            }
-            if let Some(sums) = &mut out.sums {
-                sums.values[at] = sum;
+            *total = tree.total();
+        }
+        if let Values::Float(values) = &mut out.values {
+            for component in 0..n {
+                values[(first + pixel) * n + component] = match out.aov.merge {
+                    Merge::Variance => variance_of_mean(totals[component], totals[n + component], count) as f32,
+                    _ => mean(totals[component], count),
+                };
             }
         }
         if let Some(valid) = &mut out.valid {
             valid[first + pixel] = valid_fraction(count, covered);
         }
         if let Some(sums) = &mut out.sums {
+            sums.values[(first + pixel) * sum_count..][..sum_count].copy_from_slice(&totals);
             sums.counts[first + pixel] = count;
         }
     }

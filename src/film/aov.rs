@@ -21,8 +21,14 @@ pub enum SampleType {
 pub enum Merge {
     /// Mean over the samples where the value is defined; `<layer>.valid` is the fraction of such samples.
     Mean,
+    /// Mean over all samples, one without a value counting as 0: light, of which a sample that finds none has found 0.
+    All,
     /// The value of the lowest sample index: identifiers and counts are never averaged.
     First,
+    /// The number of samples.
+    Count,
+    /// The variance of the mean over all samples.
+    Variance,
 }
 
 /// What an AOV tells about, which decides what has to be computed for it.
@@ -45,6 +51,8 @@ pub enum Family {
     Retrace,
     /// Exact displacement by tracing again at another time.
     MotionRetrace,
+    /// Light.
+    Transport,
 }
 
 /// One row of the table.
@@ -70,7 +78,6 @@ pub struct Aov {
 
 /// What 11 bits of mantissa and a range of 65504 are enough for: colours and unit vectors.
 const SOUND_IN_HALF: &[&str] = &[
-    "color",
     "albedo",
     "refracted_albedo",
     "emission",
@@ -85,7 +92,28 @@ const SOUND_IN_HALF: &[&str] = &[
 impl Aov {
     /// Whether half floats hold what its values are for.
     pub fn is_sound_in_half(&self) -> bool {
-        SOUND_IN_HALF.contains(&self.name)
+        SOUND_IN_HALF.contains(&self.name) || self.is_half_by_default()
+    }
+
+    /// Whether files hold it in half floats unless asked otherwise: colours of light, whose noise is coarser than their steps.
+    pub fn is_half_by_default(&self) -> bool {
+        self.family == Family::Transport && self.merge == Merge::All
+    }
+
+    /// Whether parts of a render keep sums of it, from which a merge makes the whole.
+    pub fn has_sums(&self) -> bool {
+        matches!(self.merge, Merge::Mean | Merge::All | Merge::Variance)
+    }
+
+    /// Names of the sums that are kept per pixel: of the channels' values, and for a variance of their squares.
+    pub fn sums(&self) -> impl Iterator<Item = String> {
+        let squares = if self.merge == Merge::Variance { self.channels } else { &[] };
+        self.channels.iter().map(|c| (*c).to_owned()).chain(squares.iter().map(|c| format!("{c}2")))
+    }
+
+    /// How many sums are kept per pixel.
+    pub fn sum_count(&self) -> usize {
+        self.channels.len() * if self.merge == Merge::Variance { 2 } else { 1 }
     }
 }
 
@@ -94,6 +122,7 @@ const XY: &[&str] = &["X", "Y"];
 const UV: &[&str] = &["U", "V"];
 /// A colour: the one thing that is R, G, B.
 const RGB: &[&str] = &["R", "G", "B"];
+const RGBA: &[&str] = &["R", "G", "B", "A"];
 const X: &[&str] = &["X"];
 const Z: &[&str] = &["Z"];
 const I: &[&str] = &["I"];
@@ -112,6 +141,20 @@ const fn first(name: &'static str, unit: &'static str, family: Family, doc: &'st
     Aov { name, channels: I, sample: SampleType::Uint, unit, merge: Merge::First, has_validity: false, family, doc }
 }
 
+const fn light(name: &'static str, channels: &'static [&'static str], unit: &'static str, doc: &'static str) -> Aov {
+    let (sample, merge) = (SampleType::Float, Merge::All);
+    Aov { name, channels, sample, unit, merge, has_validity: false, family: Family::Transport, doc }
+}
+
+/// The beauty.
+pub const COLOR: &str = "color";
+/// Variance of the beauty.
+pub const VARIANCE: &str = "variance";
+/// Samples that a pixel got.
+pub const SAMPLE_COUNT: &str = "sample_count";
+/// What colours of light are measured in.
+const RADIANCE: &str = "radiance";
+
 /// The one AOV that the absorption of media is summed for.
 pub const INTERNAL_TRANSMITTANCE: &str = "internal_transmittance";
 
@@ -125,8 +168,29 @@ pub fn is_albedo(aov: &Aov) -> bool {
     matches!(aov.name, "albedo" | "refracted_albedo")
 }
 
-/// Every AOV of the geometric and differential passes.
+/// Every AOV.
 pub static AOVS: &[Aov] = &[
+    light(
+        COLOR,
+        RGBA,
+        RADIANCE,
+        "the beauty: light that reaches the camera, D65 with Y = 1 being (1, 1, 1), and the associated alpha",
+    ),
+    Aov {
+        unit: "radiance²",
+        merge: Merge::Variance,
+        ..light(
+            VARIANCE,
+            RGB,
+            RADIANCE,
+            "variance of the pixel mean of color in each channel, as its own samples tell it: the squared standard error",
+        )
+    },
+    Aov {
+        sample: SampleType::Uint,
+        merge: Merge::Count,
+        ..light(SAMPLE_COUNT, I, "count", "samples that the pixel got")
+    },
     mean(
         "ddirection_dlambda",
         XYZ,
@@ -354,9 +418,9 @@ mod tests {
     }
 
     #[test]
-    fn aliases_lead_to_rows_or_to_the_beauty() {
+    fn aliases_lead_to_rows() {
         for (alias, name) in ALIASES {
-            assert!(*name == "color" || find(alias).is_some(), "{alias}");
+            assert!(find(alias).is_some(), "{alias}: {name}");
         }
     }
 }

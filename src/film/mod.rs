@@ -82,9 +82,9 @@ pub enum Values {
 /// The exact sums behind a layer of means, kept when the render covers only a part of its samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sums {
-    /// Sums over the valid samples by [`sum::TreeSum`], interleaved like the values.
+    /// Sums over the valid samples by [`sum::TreeSum`], interleaved in the order of [`Aov::sums`].
     pub values: Vec<f64>,
-    /// How many samples were valid, per pixel.
+    /// How many samples the sums are over, per pixel: valid ones, or all.
     pub counts: Vec<u32>,
 }
 
@@ -114,7 +114,8 @@ impl Layer {
             SampleType::Uint => Values::Uint(vec![0; n]),
         };
         let valid = aov.has_validity.then(|| vec![0.0; pixels]);
-        let sums = (keep_sums && aov.has_validity).then(|| Sums { values: vec![0.0; n], counts: vec![0; pixels] });
+        let sums = (keep_sums && aov.has_sums())
+            .then(|| Sums { values: vec![0.0; pixels * aov.sum_count()], counts: vec![0; pixels] });
         Self { aov, name, half: false, values, valid, sums }
     }
 }

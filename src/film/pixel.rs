@@ -1,100 +1,196 @@
 //! One pixel in the making: samples go in by their index, a finished value per layer comes out.
 
-use super::aov::{Aov, Merge};
+use super::aov::{self, Aov, Merge};
 use super::sum::{self, TreeSum};
-use super::{Layer, SampleRange, Values};
+use super::{Layer, Values};
 
 /// Collects the samples of one pixel for all layers; used again for the next pixel.
 #[derive(Clone, Debug)]
 pub struct PixelAccumulator {
     slots: Vec<Slot>,
-    samples: SampleRange,
-    /// Values that were not finite in `f32`: counted and treated as absent.
+    /// Layers that are made of the beauty's samples.
+    color: Vec<usize>,
+    first_sample: u32,
+    /// One past the last sample that was begun.
+    next_sample: u32,
+    /// Values that were not finite in `f32`: counted, and treated as absent (light: as 0).
     pub non_finite: u64,
 }
 
 #[derive(Clone, Debug)]
 enum Slot {
     Mean { sums: Vec<TreeSum>, valid: u32 },
+    All { sums: Vec<TreeSum> },
     First { value: Option<u32> },
+    Count,
+    Variance { sums: Vec<TreeSum>, squares: Vec<TreeSum> },
+}
+
+impl Slot {
+    fn trees(&mut self) -> impl Iterator<Item = &mut TreeSum> {
+        let (sums, squares): (&mut [TreeSum], &mut [TreeSum]) = match self {
+            Self::Mean { sums, .. } | Self::All { sums } => (sums, &mut []),
+            Self::Variance { sums, squares } => (sums, squares),
+            Self::First { .. } | Self::Count => (&mut [], &mut []),
+        };
+        sums.iter_mut().chain(squares)
+    }
 }
 
 impl PixelAccumulator {
-    /// For the layers of `aovs`, in that order, over `samples`.
-    pub fn new<'a>(aovs: impl IntoIterator<Item = &'a Aov>, samples: SampleRange) -> Self {
-        let slot = |aov: &Aov| match aov.merge {
-            Merge::Mean => Slot::Mean { sums: vec![TreeSum::new(samples.begin); aov.channels.len()], valid: 0 },
-            Merge::First => Slot::First { value: None },
+    /// For the layers of `aovs`, in that order, whose first sample has index `first_sample`.
+    pub fn new<'a>(aovs: impl IntoIterator<Item = &'a Aov>, first_sample: u32) -> Self {
+        let mut color = Vec::new();
+        let slot = |(layer, aov): (usize, &Aov)| {
+            if matches!(aov.name, aov::COLOR | aov::VARIANCE) {
+                color.push(layer);
+            }
+            let trees = || vec![TreeSum::new(first_sample); aov.channels.len()];
+            match aov.merge {
+                Merge::Mean => Slot::Mean { sums: trees(), valid: 0 },
+                Merge::All => Slot::All { sums: trees() },
+                Merge::First => Slot::First { value: None },
+                Merge::Count => Slot::Count,
+                Merge::Variance => Slot::Variance { sums: trees(), squares: trees() },
+            }
         };
-        Self { slots: aovs.into_iter().map(slot).collect(), samples, non_finite: 0 }
+        let slots = aovs.into_iter().enumerate().map(slot).collect();
+        Self { slots, color, first_sample, next_sample: first_sample, non_finite: 0 }
     }
 
     /// Forgets the last pixel.
     pub fn restart(&mut self) {
+        self.next_sample = self.first_sample;
         for slot in &mut self.slots {
+            slot.trees().for_each(|sum| sum.restart(self.first_sample));
             match slot {
-                Slot::Mean { sums, valid } => {
-                    sums.iter_mut().for_each(|sum| sum.restart(self.samples.begin));
-                    *valid = 0;
-                }
+                Slot::Mean { valid, .. } => *valid = 0,
                 Slot::First { value } => *value = None,
+                Slot::All { .. } | Slot::Count | Slot::Variance { .. } => {}
             }
         }
     }
 
-    /// Adds the next sample of a layer of means; `None` where the sample has no value.
+    /// How many samples the pixel has.
+    pub fn sample_count(&self) -> u32 {
+        self.next_sample - self.first_sample
+    }
+
+    /// Says that the samples up to `end` (exclusive) have been added: the driver does, after each range.
+    pub fn advance(&mut self, end: u32) {
+        self.next_sample = end;
+    }
+
+    /// Adds the next sample of a layer of means; `None` where the sample has no value, which is 0 for light.
     ///
     /// Every layer of means must get every sample, in the order of their indices.
     pub fn add<const N: usize>(&mut self, layer: usize, value: Option<impl Into<[f64; N]>>) {
-        let Slot::Mean { sums, valid } = &mut self.slots[layer] else {
-            panic!("layer {layer} holds first values, not means");
+        let value = self.finite(value.map(Into::into));
+        match &mut self.slots[layer] {
+            Slot::Mean { sums, valid } => {
+                debug_assert_eq!(sums.len(), N, "channels of layer {layer}");
+                *valid += u32::from(value.is_some());
+                push(sums, value);
+            }
+            Slot::All { sums } => {
+                debug_assert_eq!(sums.len(), N, "channels of layer {layer}");
+                push(sums, value);
+            }
+            _ => panic!("layer {layer} does not hold means"),
+        }
+    }
+
+    /// Adds the next sample of a layer of light whose number of channels is not known when compiled.
+    pub fn add_channels(&mut self, layer: usize, values: impl IntoIterator<Item = f64>) {
+        let Slot::All { sums } = &mut self.slots[layer] else {
+            panic!("layer {layer} does not hold light");
         };
-        debug_assert_eq!(sums.len(), N, "channels of layer {layer}");
-        let value = value.map(Into::into).filter(|value| {
+        let mut values = values.into_iter();
+        for sum in sums {
+            let value = values.next().unwrap_or(0.0);
+            let representable = (value as f32).is_finite();
+            self.non_finite += u64::from(!representable);
+            sum.push(if representable { value } else { 0.0 });
+        }
+    }
+
+    /// Adds the next sample R, G, B, A of the beauty to every layer that is made of it: `color`, `variance`.
+    pub fn add_color(&mut self, rgba: [f64; 4]) {
+        if self.color.is_empty() {
+            return;
+        }
+        let value = self.finite(Some(rgba));
+        for &layer in &self.color {
+            match &mut self.slots[layer] {
+                Slot::All { sums } => push(sums, value),
+                Slot::Variance { sums, squares } => {
+                    let [r, g, b, _] = value.unwrap_or_default();
+                    push(sums, Some([r, g, b]));
+                    push(squares, Some([r * r, g * g, b * b]));
+                }
+                _ => unreachable!("the beauty's layers are these"),
+            }
+        }
+    }
+
+    fn finite<const N: usize>(&mut self, value: Option<[f64; N]>) -> Option<[f64; N]> {
+        value.filter(|value| {
             let representable = value.iter().all(|v| (*v as f32).is_finite());
             self.non_finite += u64::from(!representable);
             representable
-        });
-        match value {
-            Some(value) => {
-                *valid += 1;
-                sums.iter_mut().zip(value).for_each(|(sum, v)| sum.push(v));
-            }
-            None => sums.iter_mut().for_each(|sum| sum.push(0.0)),
-        }
+        })
     }
 
     /// Offers the value of the next sample to a layer that keeps the first.
     pub fn add_first(&mut self, layer: usize, sample: u32) {
         let Slot::First { value } = &mut self.slots[layer] else {
-            panic!("layer {layer} holds means, not first values");
+            panic!("layer {layer} does not hold first values");
         };
         value.get_or_insert(sample);
     }
 
     /// Writes the pixel's values to place `pixel` of `layers`.
     pub fn finish(&self, layers: &mut [Layer], pixel: usize) {
+        let taken = self.sample_count();
         for (slot, layer) in self.slots.iter().zip(layers) {
+            let range = |count: usize| pixel * count..(pixel + 1) * count;
             match (slot, &mut layer.values) {
                 (Slot::Mean { sums, valid }, Values::Float(values)) => {
-                    let channels = sums.len();
-                    let range = pixel * channels..(pixel + 1) * channels;
-                    for (sum, value) in sums.iter().zip(&mut values[range.clone()]) {
-                        *value = sum::mean(sum.total(), *valid);
-                    }
+                    means(sums, *valid, &mut values[range(sums.len())]);
                     if let Some(fraction) = &mut layer.valid {
-                        fraction[pixel] = sum::valid_fraction(*valid, self.samples.end - self.samples.begin);
+                        fraction[pixel] = sum::valid_fraction(*valid, taken);
                     }
-                    if let Some(kept) = &mut layer.sums {
-                        kept.counts[pixel] = *valid;
-                        kept.values[range].iter_mut().zip(sums).for_each(|(kept, sum)| *kept = sum.total());
+                }
+                (Slot::All { sums }, Values::Float(values)) => means(sums, taken, &mut values[range(sums.len())]),
+                (Slot::Variance { sums, squares }, Values::Float(values)) => {
+                    for ((sum, squares), value) in sums.iter().zip(squares).zip(&mut values[range(sums.len())]) {
+                        *value = sum::variance_of_mean(sum.total(), squares.total(), taken) as f32;
                     }
                 }
                 (Slot::First { value }, Values::Uint(values)) => values[pixel] = value.unwrap_or(0),
+                (Slot::Count, Values::Uint(values)) => values[pixel] = taken,
                 _ => unreachable!("the AOV's sample type follows its merge rule"),
+            }
+            if let Some(kept) = &mut layer.sums {
+                let (trees, count): (Vec<&TreeSum>, u32) = match slot {
+                    Slot::Mean { sums, valid } => (sums.iter().collect(), *valid),
+                    Slot::All { sums } => (sums.iter().collect(), taken),
+                    Slot::Variance { sums, squares } => (sums.iter().chain(squares).collect(), taken),
+                    Slot::First { .. } | Slot::Count => unreachable!("only sums are kept as sums"),
+                };
+                kept.counts[pixel] = count;
+                kept.values[range(trees.len())].iter_mut().zip(trees).for_each(|(kept, sum)| *kept = sum.total());
             }
         }
     }
+}
+
+fn push<const N: usize>(sums: &mut [TreeSum], value: Option<[f64; N]>) {
+    sums.iter_mut().zip(value.unwrap_or([0.0; N])).for_each(|(sum, v)| sum.push(v));
+}
+
+fn means(sums: &[TreeSum], count: u32, values: &mut [f32]) {
+    sums.iter().zip(values).for_each(|(sum, value)| *value = sum::mean(sum.total(), count));
 }
 
 #[cfg(test)]
@@ -102,16 +198,20 @@ mod tests {
     use super::super::aov;
     use super::*;
 
+    fn layers(aovs: &[&'static Aov], keep_sums: bool) -> Vec<Layer> {
+        aovs.iter().map(|aov| Layer::new(aov, aov.name.into(), 1, keep_sums)).collect()
+    }
+
     #[test]
     fn means_are_over_valid_samples_and_ids_are_the_first() {
         let aovs = [aov::find("uv").unwrap(), aov::find("prim_id").unwrap()];
-        let samples = SampleRange::all(4);
-        let mut pixel = PixelAccumulator::new(aovs, samples);
-        let mut layers: Vec<_> = aovs.iter().map(|aov| Layer::new(aov, aov.name.into(), 1, false)).collect();
+        let mut pixel = PixelAccumulator::new(aovs, 0);
+        let mut layers = layers(&aovs, false);
         for (value, id) in [(Some([1.0, 2.0]), 7), (None, 8), (Some([3.0, 6.0]), 9), (Some([f64::NAN, 0.0]), 9)] {
             pixel.add(0, value);
             pixel.add_first(1, id);
         }
+        pixel.advance(4);
         pixel.finish(&mut layers, 0);
         assert_eq!(layers[0].values, Values::Float(vec![2.0, 4.0]));
         assert_eq!(layers[0].valid, Some(vec![0.5]));
@@ -120,5 +220,29 @@ mod tests {
         pixel.restart();
         pixel.finish(&mut layers, 0);
         assert_eq!(layers[0].values, Values::Float(vec![0.0, 0.0]));
+    }
+
+    #[test]
+    fn light_is_a_mean_over_all_samples_with_its_variance() {
+        let aovs = ["color", "variance", "sample_count"].map(|name| aov::find(name).unwrap());
+        let mut pixel = PixelAccumulator::new(aovs, 0);
+        let mut layers = layers(&aovs, true);
+        // 1, 2, 3, 6 in red: mean 3, variance of a sample 14/3, of the mean 7/6.
+        for red in [1.0, 2.0, 3.0, 6.0] {
+            pixel.add_color([red, -red, 0.5, 1.0]);
+        }
+        pixel.advance(4);
+        pixel.finish(&mut layers, 0);
+        assert_eq!(layers[0].values, Values::Float(vec![3.0, -3.0, 0.5, 1.0]));
+        assert_eq!(layers[1].values, Values::Float(vec![7.0 / 6.0, 7.0 / 6.0, 0.0]));
+        assert_eq!(layers[2].values, Values::Uint(vec![4]));
+        assert!(layers.iter().all(|layer| layer.valid.is_none()));
+        assert_eq!(layers[1].sums.as_ref().unwrap().values, [12.0, -12.0, 2.0, 50.0, 50.0, 1.0]);
+        // What is not finite counts as 0, and is counted.
+        pixel.add_color([f64::INFINITY, 0.0, 0.5, 1.0]);
+        pixel.advance(5);
+        pixel.finish(&mut layers, 0);
+        assert_eq!(layers[0].values, Values::Float(vec![2.4, -2.4, 0.4, 0.8]));
+        assert_eq!(pixel.non_finite, 1);
     }
 }

@@ -80,6 +80,17 @@ pub fn mean(sum: f64, count: u32) -> f32 {
     if count == 0 { 0.0 } else { (sum / f64::from(count)) as f32 }
 }
 
+/// Unbiased estimate of the variance of the mean of `count` samples, from their sum and that of their squares; 0 where one
+/// sample or none tells nothing of it.
+pub fn variance_of_mean(sum: f64, squares: f64, count: u32) -> f64 {
+    if count < 2 {
+        return 0.0;
+    }
+    let n = f64::from(count);
+    // Less than 0 by rounding only.
+    ((squares - sum * sum / n) / (n * (n - 1.0))).max(0.0)
+}
+
 /// What the `valid` channel stores: the fraction of `samples` that have a value.
 pub fn valid_fraction(count: u32, samples: u32) -> f32 {
     (f64::from(count) / f64::from(samples)) as f32

@@ -259,6 +259,35 @@ impl Aggregate {
         nearest.hit
     }
 
+    /// Whether some surface before `limit` blocks the ray. Each that the ray meets is asked, in no particular order and some
+    /// maybe not at all, until one blocks.
+    ///
+    /// `departures` says which surfaces the ray starts on. A surface at the limit itself counts as behind it.
+    pub fn is_blocked(
+        &self,
+        ray: &Ray,
+        departures: &Departures,
+        limit: f64,
+        mut blocks: impl FnMut(&Hit) -> bool,
+    ) -> bool {
+        let (from, standing) = if departures.is_none() {
+            (0.0, None)
+        } else {
+            let magnitude = ray.origin.abs().max_element() + self.reach(ray, departures);
+            (-behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest)), Some((departures, magnitude)))
+        };
+        let mut is_blocked = false;
+        self.tree.walk(ray.origin, ray.direction, from, limit, self.spread, |i, _| {
+            let instance = self.instance(i);
+            let mut meets = |hit: &Hit| hit.distance < limit && blocks(hit);
+            let met = self.with(instance, ray.time, |placed| placed.meets(ray, instance, standing, limit, &mut meets));
+            is_blocked |= met == Some(true);
+            // Nothing is before this.
+            if is_blocked { f64::NEG_INFINITY } else { limit }
+        });
+        is_blocked
+    }
+
     /// A surface of an instance that `is_member`, which passes through the start of the ray, within rounding, and which the
     /// ray has not crossed there. Casts no further than that.
     pub fn coincident(&self, ray: &Ray, departures: &Departures, is_member: impl Fn(u32) -> bool) -> Option<Hit> {
@@ -483,14 +512,50 @@ impl ObjectRay {
 }
 
 impl Placed<'_> {
-    fn intersect(&self, ray: &Ray, instance: u32, standing: Option<(&Departures, f64)>, nearest: &mut Nearest) {
-        let object = self.ray(ray);
-        let start = standing.map(|(departures, magnitude)| Start {
+    /// What a ray that stands on surfaces knows of them in this object's space.
+    fn start<'d>(
+        &self,
+        object: &ObjectRay,
+        instance: u32,
+        standing: Option<(&'d Departures, f64)>,
+    ) -> Option<Start<'d>> {
+        standing.map(|(departures, magnitude)| Start {
             instance,
             crossings: departures.crossings(),
             arrival: self.inverse * departures.arrival(),
-            magnitude: self.start_magnitude(magnitude, &object),
+            magnitude: self.start_magnitude(magnitude, object),
+        })
+    }
+
+    /// Whether a surface before `limit` is one that `blocks`. Of an analytic shape only the first surface is asked: all of
+    /// it has one material and no texture coordinates.
+    fn meets(
+        &self,
+        ray: &Ray,
+        instance: u32,
+        standing: Option<(&Departures, f64)>,
+        limit: f64,
+        blocks: &mut dyn FnMut(&Hit) -> bool,
+    ) -> bool {
+        let Shape::Mesh(mesh) = self.shape else {
+            let mut nearest = Nearest { hit: None, limit };
+            self.intersect(ray, instance, standing, &mut nearest);
+            return nearest.hit.is_some_and(|hit| blocks(&hit));
+        };
+        let object = self.ray(ray);
+        let start = self.start(&object, instance, standing);
+        let limit = limit * object.stretch;
+        let mut is_blocked = false;
+        mesh.walk(object.origin, object.direction, ray.time, start.as_ref(), limit, |hit| {
+            is_blocked = is_blocked || blocks(&object.hit(instance, &hit));
+            if is_blocked { f64::NEG_INFINITY } else { limit }
         });
+        is_blocked
+    }
+
+    fn intersect(&self, ray: &Ray, instance: u32, standing: Option<(&Departures, f64)>, nearest: &mut Nearest) {
+        let object = self.ray(ray);
+        let start = self.start(&object, instance, standing);
         match self.shape {
             Shape::Mesh(mesh) => {
                 let mut sides = Sides::new(nearest.limit);

@@ -4,6 +4,8 @@
 //! All derivatives are taken at the reference wavelength. Where no refraction of the chain has a dispersive medium they
 //! are 0 and valid; on a miss those of position are absent; a chain without an end has none at all.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 
 use super::chain::{Chain, Counters, End, Follower, Record, SurfacePoint};
@@ -35,7 +37,7 @@ impl Integrator for Differentials {
     }
 
     fn aovs(&self) -> Vec<&'static Aov> {
-        AOVS.iter().collect()
+        AOVS.iter().filter(|aov| aov.family != Family::Transport).collect()
     }
 
     fn prepare<'a>(&self, task: &'a Task<'a>) -> Result<Box<dyn PreparedIntegrator + 'a>> {
@@ -62,6 +64,8 @@ enum Output {
     RoughInterfaces,
     TotalReflections,
     Surface(SurfaceValue, Whose),
+    /// Another integrator's.
+    Light,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -118,13 +122,15 @@ impl Output {
             "prim_id" => SurfaceValue::PrimId,
             "instance_id" => SurfaceValue::InstanceId,
             "material_id" => SurfaceValue::MaterialId,
+            _ if aov.family == Family::Transport => return Self::Light,
             other => unreachable!("the AOV '{other}' is in the table but not in this integrator"),
         };
         Self::Surface(value, whose)
     }
 }
 
-struct Prepared<'a> {
+/// `differentials` made ready for one image.
+pub(super) struct Prepared<'a> {
     task: &'a Task<'a>,
     follower: Follower<'a>,
     media: Media,
@@ -166,6 +172,33 @@ impl<'a> Prepared<'a> {
     }
 }
 
+/// Adds the geometric and differential layers of one sample: what other integrators do beside their own.
+pub(super) trait SampleWorker {
+    /// Adds the sample at `place` to every such layer.
+    fn sample(&mut self, place: &CameraSample, out: &mut PixelAccumulator);
+    /// What it has done so far.
+    fn counters(&self) -> Counters;
+}
+
+impl Differentials {
+    /// Made ready beside another integrator, whose layers are left alone.
+    pub(super) fn prepared<'a>(task: &'a Task<'a>) -> Result<Prepared<'a>> {
+        Prepared::new(task)
+    }
+}
+
+impl Prepared<'_> {
+    /// A worker for one thread.
+    pub(super) fn sample_worker(&self) -> Box<dyn SampleWorker + '_> {
+        match self.task.needs.columns {
+            Columns::None => Box::new(Carrier::<NoColumns>::new(self)),
+            Columns::Lambda => Box::new(Carrier::<LambdaColumn>::new(self)),
+            Columns::Screen => Box::new(Carrier::<ScreenColumns>::new(self)),
+            Columns::SecondOrder => Box::new(Carrier::<SecondOrderColumns>::new(self)),
+        }
+    }
+}
+
 impl PreparedIntegrator for Prepared<'_> {
     fn worker(&self) -> Box<dyn Worker + '_> {
         match self.task.needs.columns {
@@ -187,11 +220,21 @@ struct Carrier<'a, C> {
 }
 
 impl<C: ColumnSet> Worker for Carrier<'_, C> {
-    fn render(&mut self, pixel: [i32; 2], out: &mut PixelAccumulator) {
+    fn render(&mut self, pixel: [i32; 2], range: Range<u32>, out: &mut PixelAccumulator) {
         let task = self.prepared.task;
-        for index in task.samples.begin..task.samples.end {
-            self.sample(&task.sampler.sample(pixel, index), out);
+        for index in range {
+            self.add_sample(&task.sampler.sample(pixel, index), out);
         }
+    }
+
+    fn counters(&self) -> Counters {
+        self.counters
+    }
+}
+
+impl<C: ColumnSet> SampleWorker for Carrier<'_, C> {
+    fn sample(&mut self, place: &CameraSample, out: &mut PixelAccumulator) {
+        self.add_sample(place, out);
     }
 
     fn counters(&self) -> Counters {
@@ -210,7 +253,7 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
         }
     }
 
-    fn sample(&mut self, place: &CameraSample, out: &mut PixelAccumulator) {
+    fn add_sample(&mut self, place: &CameraSample, out: &mut PixelAccumulator) {
         let Prepared { task, follower, media, .. } = self.prepared;
         let start = task.camera.ray(place);
         if !task.needs.chain {
@@ -275,6 +318,7 @@ impl<'a, C: ColumnSet> Carrier<'a, C> {
                 }
                 Output::Interfaces => out.add_first(layer, chain.interfaces),
                 Output::RoughInterfaces => out.add_first(layer, chain.rough_interfaces),
+                Output::Light => {}
                 Output::TotalReflections => out.add_first(layer, chain.total_reflections),
                 Output::Surface(value, Whose::First) => self.surface_value(value, layer, &start, first, out),
                 Output::Surface(value, Whose::Chain) => {

@@ -7,10 +7,17 @@
 pub mod chain;
 mod counters;
 pub mod differentials;
+mod frame;
+mod lanes;
+pub mod path;
+pub mod reference;
 mod screen_motion;
 mod search;
+mod surface;
 pub mod transmittance;
+mod walk;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use serde::Serialize;
@@ -23,6 +30,7 @@ use crate::film::pixel::PixelAccumulator;
 use crate::sampler::Sampler;
 use crate::scene::view::View;
 use crate::spectrum::Wavelength;
+use crate::spectrum::sensor::ColorSpace;
 use chain::Counters;
 
 /// Which columns a ray carries, from the least to the most.
@@ -54,6 +62,8 @@ pub struct Needs {
     pub transmittance: bool,
     /// Whether the colours of surfaces are looked up.
     pub albedo: bool,
+    /// Whether light is followed: lights are compiled, and all that surfaces scatter with is looked up.
+    pub transport: bool,
 }
 
 impl Needs {
@@ -72,12 +82,13 @@ impl Needs {
             Columns::None
         };
         Self {
-            chain: aovs.iter().any(|aov| aov.family != Family::FirstSurface),
+            chain: aovs.iter().any(|aov| !matches!(aov.family, Family::FirstSurface | Family::Transport)),
             columns,
             second_chain: is_dispersive && has(Family::ScreenSecondOrder),
             retrace: is_dispersive && has(Family::Retrace),
             albedo: aovs.iter().any(|aov| is_albedo(aov)),
             transmittance: aovs.iter().any(|aov| aov.name == INTERNAL_TRANSMITTANCE),
+            transport: has(Family::Transport),
         }
     }
 }
@@ -117,8 +128,10 @@ pub struct Task<'a> {
     pub optics: Optics,
     /// Where in the pixel.
     pub sampler: Sampler,
-    /// Which samples.
+    /// Which samples: workers are asked for parts of them.
     pub samples: SampleRange,
+    /// What the numbers of colours mean.
+    pub color_space: ColorSpace,
     /// Full raster, pixels.
     pub resolution: [u32; 2],
     /// Whether something moves and vectors of motion are wanted; they are 0 if not.
@@ -149,8 +162,10 @@ pub trait PreparedIntegrator: Send + Sync {
 
 /// Renders pixels on one thread. What it writes depends on the pixel and its sample indices alone.
 pub trait Worker {
-    /// Adds every sample of the task to every layer of `pixel` (x right, y down).
-    fn render(&mut self, pixel: [i32; 2], out: &mut PixelAccumulator);
+    /// Adds the samples `range` of `pixel` (x right, y down) to every layer, in order.
+    ///
+    /// Called with consecutive ranges, which depend on what was asked for; their bounds must not change a bit.
+    fn render(&mut self, pixel: [i32; 2], range: Range<u32>, out: &mut PixelAccumulator);
     /// What it has done so far.
     fn counters(&self) -> Counters;
 }
@@ -164,7 +179,13 @@ pub struct Registry {
 impl Default for Registry {
     /// The integrators of this crate.
     fn default() -> Self {
-        Self { integrators: vec![Arc::new(differentials::Differentials)] }
+        Self {
+            integrators: vec![
+                Arc::new(differentials::Differentials),
+                Arc::new(path::Path),
+                Arc::new(reference::Reference),
+            ],
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use super::request::Request;
 use super::settings::Attributes;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::film::aov::{self, Aov, SampleType};
+use crate::film::aov::{self, Aov, Family, SampleType};
 use crate::integrator::Registry;
 use crate::scene::description::{Product, Var};
 
@@ -29,8 +29,8 @@ const DEFAULT_AOVS: &[&str] = &[
     "material_id",
 ];
 
-/// The name of the beauty, whose channels stand bare.
-const BEAUTY: &str = "color";
+/// The beauty, whose channels stand bare.
+const BEAUTY: &str = aov::COLOR;
 
 /// Parameters of a RenderVar's driver that are understood, with those that have no meaning here by their usual value.
 const VAR_PARAMETERS: &[&str] = &["name", "format", "channel_prefix", "clearValue", "multiSampled"];
@@ -53,7 +53,7 @@ fn aov_name<S: serde::Serializer>(aov: &&'static Aov, serializer: S) -> Result<S
 
 impl PlannedLayer {
     fn plain(aov: &'static Aov) -> Self {
-        Self { aov, name: layer_name(aov.name, aov.name, ""), half: false }
+        Self { aov, name: layer_name(aov.name, aov.name, ""), half: aov.is_half_by_default() }
     }
 }
 
@@ -75,7 +75,10 @@ pub(super) fn layers(
 ) -> Result<(String, Vec<PlannedLayer>)> {
     let chosen = match &request.integrator {
         Some(name) => name.clone(),
-        None => attributes.text("abbe:integrator")?.filter(|name| !name.is_empty()).unwrap_or("differentials".into()),
+        None => match attributes.text("abbe:integrator")?.filter(|name| !name.is_empty()) {
+            Some(name) => name,
+            None => default_integrator(request, product).to_owned(),
+        },
     };
     let integrator = registry.find(&chosen)?;
     let offered = integrator.aovs();
@@ -85,7 +88,6 @@ pub(super) fn layers(
     };
     let unavailable = |name: &str| match aov::find(name) {
         Some(_) => format!("the integrator '{chosen}' has no '{name}'"),
-        None if aov::canonical_name(name) == BEAUTY => format!("the integrator '{chosen}' has no '{name}'"),
         None => format!("the integrator '{chosen}' has no AOV '{name}'; `abbe aovs` lists what there is"),
     };
     let mut layers: Vec<PlannedLayer> = Vec::new();
@@ -140,6 +142,16 @@ pub(super) fn layers(
     Ok((chosen, layers))
 }
 
+/// The integrator that nobody chose: with light transport if some AOV asks for light.
+fn default_integrator(request: &Request, product: Option<&Product>) -> &'static str {
+    let is_light = |name: &str| aov::find(name).is_some_and(|aov| aov.family == Family::Transport);
+    let asks = match &request.aovs {
+        Some(names) => names.iter().any(|name| is_light(name)),
+        None => product.is_some_and(|p| p.vars.iter().any(|var| source(var).is_ok_and(is_light))),
+    };
+    if asks { "path" } else { "differentials" }
+}
+
 fn text<'a>(var: &'a Var, name: &str) -> &'a str {
     var.driver.get(name).and_then(|a| a.value.as_str()).unwrap_or("")
 }
@@ -186,6 +198,8 @@ fn is_half(var: &Var, aov: &Aov, diagnostics: &mut Diagnostics) -> bool {
             false
         }
         SampleType::Float if wants_half && aov.is_sound_in_half() => true,
+        // `dataType` alone does not tell: color3f is what the schema says where nobody says anything.
+        SampleType::Float if format.is_empty() && aov.is_half_by_default() => true,
         SampleType::Float => {
             if wants_half {
                 refuse("half-format", "asks for half floats, which lose what a derivative is for: FLOAT is written");

@@ -4,15 +4,14 @@ use serde_json::json;
 
 use super::Plan;
 use crate::camera::{Camera, linear_exposure_scale};
-use crate::film::aov::Merge;
+use crate::film::aov::{Family, Merge};
 use crate::film::metadata::{Attribute, Metadata};
 use crate::scene::Scene;
 use crate::scene::description;
 use crate::spectrum::Wavelength;
+use crate::spectrum::color::RgbSpace;
+use crate::spectrum::sensor::ColorSpace;
 use glam::{DMat4, DVec4};
-
-/// CIE x, y of the Rec.709 primaries and D65: the space of colour channels, stated even where a file has none.
-const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
 
 /// What a film of `plan` says about itself. Times and machines are left out, so that the same render gives the same bytes.
 pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bool) -> Metadata {
@@ -85,7 +84,16 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
     let laws: serde_json::Map<_, _> = plan.materials.iter().map(|d| (d.what.clone(), json!(d.why))).collect();
     set("abbe:materials", Attribute::Text(serde_json::Value::Object(laws).to_string()));
 
-    set("chromaticities", Attribute::Chromaticities(REC709));
+    let transports = plan.layers.iter().any(|layer| layer.aov.family == Family::Transport);
+    // Colours of surfaces stay what they are authored in.
+    let space = if transports { plan.color_space } else { ColorSpace::Rgb(RgbSpace::REC709) };
+    set("chromaticities", Attribute::Chromaticities(space.chromaticities().map(|xy| xy.map(|v| v as f32))));
+    if transports {
+        set("colorInteropID", text(space.interop_id()));
+        if let ColorSpace::Rgb(RgbSpace { white: [x, y], .. }) = space {
+            set("adoptedNeutral", Attribute::Vec2([x as f32, y as f32]));
+        }
+    }
     if let Some(rate) = stage.frames_per_second.filter(|rate| *rate > 0.0 && *rate < 1e6) {
         // Film and video rates are n or n·1000/1001.
         let (n, d) = if rate.fract() == 0.0 { (rate as i32, 1) } else { ((rate * 1001.0).round() as i32, 1001) };
@@ -169,7 +177,8 @@ fn settings_hash(scene: &Scene, plan: &Plan) -> String {
     if plan.shutter.is_none() && !plan.motion_vectors {
         camera.motion = None;
     }
-    let decisive = json!({
+    let transports = plan.layers.iter().any(|layer| layer.aov.family == Family::Transport);
+    let mut decisive = json!({
         "camera": camera,
         "resolution": plan.resolution,
         "pixelAspectRatio": plan.pixel_aspect_ratio,
@@ -185,6 +194,9 @@ fn settings_hash(scene: &Scene, plan: &Plan) -> String {
         "objects": scene.counts.objects,
         "triangles": scene.counts.triangles,
     });
+    if transports {
+        decisive["colorSpace"] = json!(plan.color_space.interop_id());
+    }
     // FNV-1a (Fowler, Noll, Vo): tells settings apart, guards nothing.
     let hash = decisive
         .to_string()

@@ -164,6 +164,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
         optics: plan.optics,
         sampler: Sampler::new(plan.samples.total, plan.seed)?.over_time(plan.shutter.is_some()),
         samples: plan.samples,
+        color_space: plan.color_space,
         resolution: plan.resolution,
         motion_vectors: plan.motion_vectors,
     };
@@ -177,7 +178,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
     let done = AtomicU64::new(0);
     let shared = Mutex::new((&mut film, Counters::default(), 0u64));
     tiles.par_iter().for_each_init(
-        || (prepared.worker(), PixelAccumulator::new(aovs.iter().copied(), plan.samples), Counters::default(), 0),
+        || (prepared.worker(), PixelAccumulator::new(aovs.iter().copied(), plan.samples.begin), Counters::default(), 0),
         |(worker, pixel, counted, non_finite_counted), &tile| {
             if control.cancel.load(Ordering::Relaxed) || textures::has_failed(scene) {
                 return;
@@ -189,7 +190,8 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
             for y in tile.y0..tile.y1 {
                 for x in tile.x0..tile.x1 {
                     pixel.restart();
-                    worker.render([x, y], pixel);
+                    worker.render([x, y], plan.samples.begin..plan.samples.end, pixel);
+                    pixel.advance(plan.samples.end);
                     pixel.finish(&mut layers, index);
                     index += 1;
                 }

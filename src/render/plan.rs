@@ -27,6 +27,7 @@ use crate::optics::dispersion::Dispersion;
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
 use crate::scene::{Scene, lights};
+use crate::spectrum::sensor::ColorSpace;
 use crate::spectrum::{Wavelength, lines};
 
 /// A decision with its reason.
@@ -111,6 +112,9 @@ pub struct Plan {
     pub layers: Vec<PlannedLayer>,
     /// Wavelengths.
     pub optics: Optics,
+    /// What the numbers of colours of light mean.
+    #[serde(serialize_with = "interop_id")]
+    pub color_space: ColorSpace,
     /// What is computed.
     pub needs: Needs,
     /// EXR compression.
@@ -127,6 +131,10 @@ pub struct Plan {
     /// Oddities of the request and of the stage's settings.
     #[serde(rename = "warnings")]
     pub diagnostics: Diagnostics,
+}
+
+fn interop_id<S: serde::Serializer>(space: &ColorSpace, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(space.interop_id())
 }
 
 /// Plans for every product of the scene that `request` asks for; one plan if the stage has no product.
@@ -178,6 +186,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     };
     let driver = product.map(|p| Driver::new(p, &mut diagnostics)).unwrap_or_default();
     attributes.warn_of_unused(&mut diagnostics);
+    let color_space = settings::color_space(scene, product, &aovs, &mut diagnostics);
     textures::report_missing(scene, &needs, &mut diagnostics);
     if request.strict {
         refuse_warnings(&[scene.diagnostics(), &diagnostics])?;
@@ -203,6 +212,7 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         integrator: integrator.name().to_owned(),
         layers,
         optics,
+        color_space,
         needs,
         compression: driver.compression,
         header: driver.header,
@@ -323,14 +333,21 @@ fn reasons(
             None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
         }
     }
-    let unused = format!("the integrator '{}' has no use for them", integrator.name());
     let kinds: Vec<_> =
         lights::kinds(scene.document()).into_iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+    let emitting = scene.materials.iter().find(|material| material.surface.emits());
+    let why = match needs.transport {
+        true => format!("{} for light", list(&asked(&[Family::Transport]), "asks", "ask")),
+        false => format!("the integrator '{}' has no use for them, or no AOV asks for light", integrator.name()),
+    };
     if kinds.is_empty() {
-        note(false, "light sampling, emission", unused);
+        note(false, "light sampling", "the stage has no lights".into());
     } else {
-        note(false, &format!("lights ({})", kinds.join(", ")), unused.clone());
-        note(false, "emission", unused);
+        note(needs.transport, &format!("lights ({})", kinds.join(", ")), why.clone());
+    }
+    match emitting {
+        None => note(false, "emission", "no material in use emits".into()),
+        Some(material) => note(needs.transport, "emission", format!("{} emits, and {why}", material.path)),
     }
     textures::decide(scene, layers, needs, &mut note);
     if scene.objects.hides_some() {

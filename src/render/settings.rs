@@ -5,10 +5,13 @@ use serde_json::Value;
 use super::request::Request;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
+use crate::film::aov::{Aov, Family};
 use crate::film::{SampleRange, sum};
 use crate::integrator::Optics;
 use crate::scene::Scene;
 use crate::scene::description::{Authored, AuthoredMap, Product};
+use crate::spectrum::color::RgbSpace;
+use crate::spectrum::sensor::ColorSpace;
 use crate::spectrum::{self, Wavelength};
 
 /// More threads than this would spend their time on each other: no machine has as many cores.
@@ -90,6 +93,33 @@ pub(super) fn optics(request: &Request, attributes: &Attributes<'_>) -> Result<O
         return Err(Error::usage("--dispersion-scale", format!("must be 0 to 1000, not {dispersion_scale}")));
     }
     Ok(Optics { reference, band, channels, dispersion_scale })
+}
+
+/// The space of colours of light: the stage's `renderingColorSpace`, else linear Rec. 709.
+pub(super) fn color_space(
+    scene: &Scene,
+    product: Option<&Product>,
+    aovs: &[&Aov],
+    diagnostics: &mut Diagnostics,
+) -> ColorSpace {
+    let default = ColorSpace::Rgb(RgbSpace::REC709);
+    let base = product.or(scene.document().settings.base.as_ref()).map_or("", |p| p.rendering_color_space.as_str());
+    if base.is_empty() {
+        return default;
+    }
+    ColorSpace::from_token(base).unwrap_or_else(|| {
+        if aovs.iter().any(|aov| aov.family == Family::Transport) {
+            diagnostics.warn(
+                "color-space",
+                format!("{}.renderingColorSpace", product.map_or("render settings", |p| p.path.as_str())),
+                format!(
+                    "'{base}' is not a space that colours are written in ({}): linear Rec. 709 is written",
+                    ColorSpace::TOKENS.join(", ")
+                ),
+            );
+        }
+        default
+    })
 }
 
 /// Authored `abbe:…` attributes, the product's before the settings'.

@@ -4,12 +4,14 @@
 
 pub mod blackbody;
 pub mod color;
+mod fit;
 pub mod illuminant;
 pub mod lines;
 pub mod observer;
 pub mod reflectance;
 pub mod response;
 pub mod sampled;
+pub mod sensor;
 mod tables;
 pub mod uplift;
 pub mod visible;

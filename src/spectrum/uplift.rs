@@ -7,13 +7,13 @@
 //! solved for the colour of T itself. As a transmittance it would be right in colour only: a glass that is nearly white
 //! but for a tenth in red would let through a thousandth at 700 nm, where the eye does not look but thickness does.
 //!
-//! A colour is linear Rec. 709 under D65: channel i of T is ∫ T D65 rᵢ dλ / ∫ D65 rᵢ dλ with rᵢ of [`Rec709`],
+//! A colour is linear Rec. 709 under D65: channel i of T is ∫ T D65 rᵢ dλ / ∫ D65 rᵢ dλ with rᵢ of [`Rec709`](super::response::Rec709),
 //! so that T = 1 is (1, 1, 1) exactly, whatever the white of the responses.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
-use super::response::Rec709;
-use super::{LONGEST, SHORTEST, Wavelength, illuminant};
+use super::Wavelength;
+use super::fit::{Curve, Fit, inverse_sigmoid, powers, sigmoid, sigmoid_slope};
 
 /// A channel below this counts as this: black has no optical depth. It is a third of the first step above black of an
 /// 8-bit sRGB image, so that nothing that was painted is changed.
@@ -48,7 +48,10 @@ impl Transmittance {
         if color.x.to_bits() == color.y.to_bits() && color.y.to_bits() == color.z.to_bits() {
             return Ok(grey);
         }
-        Ok(Fit::new(deepest).solve(color))
+        // The sigmoid's inverse at the share of the depth that the grey has: it lies within (0, ½).
+        let share = -libm::log(color.element_sum() / 3.0) / deepest;
+        let coefficients = Fit::new(transmittance(deepest)).solve(color, inverse_sigmoid(share));
+        Ok(Self { deepest, coefficients })
     }
 
     /// −ln T ≥ 0 at `wavelength`. Outside of 360–830 nm, that of the nearer end.
@@ -62,140 +65,19 @@ impl Transmittance {
     }
 }
 
-/// 1, u, u².
-fn powers(wavelength: Wavelength) -> DVec3 {
-    let (first, last) = (SHORTEST.nanometers(), LONGEST.nanometers());
-    let nm = wavelength.nanometers().clamp(first, last);
-    let u = (2.0 * nm - (first + last)) / (last - first);
-    DVec3::new(1.0, u, u * u)
-}
-
-/// S(x) = ½ + x / (2√(1 + x²)), within (0, 1) also where that form cancels.
-fn sigmoid(x: f64) -> f64 {
-    let root = (1.0 + x * x).sqrt();
-    if x < 0.0 { 0.5 / (root * (root - x)) } else { 0.5 * (1.0 + x / root) }
-}
-
-/// One wavelength of the quadrature.
-struct Node {
-    powers: DVec3,
-    /// D65 times the responses, each channel's divided by its sum.
-    weights: DVec3,
-}
-
-/// The search for the coefficients.
-struct Fit {
-    nodes: Vec<Node>,
-    deepest: f64,
-}
-
-/// What the current coefficients give.
-struct Trial {
-    coefficients: DVec3,
-    residual: DVec3,
-    /// ∂color/∂c.
-    jacobian: DMat3,
-}
-
-impl Fit {
-    /// Panels of Simpson's rule, nm: the observer's table. Within one of them responses and illuminant are linear, and the
-    /// steepest curve that a colour asks for rises within 2 nm.
-    const PANEL: f64 = 1.0;
-
-    fn new(deepest: f64) -> Self {
-        let panels = ((LONGEST.nanometers() - SHORTEST.nanometers()) / Self::PANEL) as u32;
-        let responses = Rec709::default();
-        let mut nodes: Vec<_> = (0..=2 * panels)
-            .map(|i| {
-                let nm = SHORTEST.nanometers() + f64::from(i) * 0.5 * Self::PANEL;
-                let wavelength = Wavelength::from_nanometers(nm);
-                // 1 4 2 4 … 4 1
-                let simpson = if i % 2 == 1 {
-                    4.0
-                } else if i == 0 || i == 2 * panels {
-                    1.0
-                } else {
-                    2.0
-                };
-                let weights = responses.at(wavelength) * (simpson * illuminant::d65(wavelength));
-                Node { powers: powers(wavelength), weights }
-            })
-            .collect();
-        let white: DVec3 = nodes.iter().map(|node| node.weights).sum();
-        nodes.iter_mut().for_each(|node| node.weights /= white);
-        Self { nodes, deepest }
-    }
-
-    fn trial(&self, coefficients: DVec3, target: DVec3) -> Trial {
-        let (mut color, mut columns) = (DVec3::ZERO, [DVec3::ZERO; 3]);
-        for node in &self.nodes {
-            let x = coefficients.dot(node.powers);
-            let transmittance = libm::exp(-self.deepest * sigmoid(x));
-            color += node.weights * transmittance;
-            // S' = ½ (1 + x²)^(−3/2).
-            let square = 1.0 + x * x;
-            let slope = -self.deepest * transmittance * 0.5 / (square * square.sqrt());
-            let weighted = node.weights * slope;
-            for (column, power) in columns.iter_mut().zip(node.powers.to_array()) {
-                *column += weighted * power;
-            }
-        }
-        let [a, b, c] = columns;
-        Trial { coefficients, residual: color - target, jacobian: DMat3::from_cols(a, b, c) }
-    }
-
-    /// Levenberg–Marquardt steps for a target that walks from the grey of the same mean, where the answer is known, to
-    /// `color`. From the answer for one target the next is found in a few steps; the work is bounded.
-    fn solve(&self, color: DVec3) -> Transmittance {
-        const TARGETS: u32 = 8;
-        const STEPS: u32 = 6;
-        const LAST_STEPS: u32 = 60;
-
-        let grey = color.element_sum() / 3.0;
-        // The sigmoid's inverse at the share of the depth that the grey has: it lies within (0, ½).
-        let share = -libm::log(grey) / self.deepest;
-        let mut coefficients = DVec3::new((share - 0.5) / (share * (1.0 - share)).sqrt(), 0.0, 0.0);
-        for k in 1..=TARGETS {
-            let target = DVec3::splat(grey).lerp(color, f64::from(k) / f64::from(TARGETS));
-            coefficients = self.descend(coefficients, target, if k < TARGETS { STEPS } else { LAST_STEPS });
-        }
-        Transmittance { deepest: self.deepest, coefficients }
-    }
-
-    fn descend(&self, start: DVec3, target: DVec3, steps: u32) -> DVec3 {
-        // A sum of a few hundred products of order one is good to this.
-        const EXACT: f64 = 1e-15;
-        // Relative to the diagonal: small enough to leave Newton's steps what they are, grown where they fail.
-        const DAMPING: f64 = 1e-9;
-
-        let mut here = self.trial(start, target);
-        let mut damping = DAMPING;
-        for _ in 0..steps {
-            if here.residual.abs().max_element() <= EXACT {
-                break;
-            }
-            let transposed = here.jacobian.transpose();
-            let mut normal = transposed * here.jacobian;
-            for i in 0..3 {
-                normal.col_mut(i)[i] *= 1.0 + damping;
-            }
-            let step = normal.inverse() * (transposed * -here.residual);
-            let next = self.trial(here.coefficients + step, target);
-            // Not true of NaN, which a singular matrix gives.
-            if next.residual.length_squared() < here.residual.length_squared() {
-                here = next;
-                damping *= 0.1;
-            } else {
-                damping *= 10.0;
-            }
-        }
-        here.coefficients
+/// T = exp(−deepest S(x)) and its slope.
+fn transmittance(deepest: f64) -> impl Fn(f64) -> Curve {
+    move |x| {
+        let value = libm::exp(-deepest * sigmoid(x));
+        Curve { value, slope: -deepest * value * sigmoid_slope(x) }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spectrum::illuminant;
+    use crate::spectrum::response::Rec709;
 
     /// The colour by an integration of its own, in steps of 0.1 nm.
     fn color(spectrum: impl Fn(Wavelength) -> f64) -> DVec3 {
@@ -243,14 +125,14 @@ mod tests {
         for rgb in grid(&[0.0, 0.003, 0.05, 0.3, 0.6, 0.9, 0.99, 1.0]) {
             let color = DVec3::from(rgb).max(DVec3::splat(DARKEST));
             let spectrum = Transmittance::of_color(rgb).unwrap();
-            let residual = Fit::new(spectrum.deepest).trial(spectrum.coefficients, color).residual;
+            let residual = Fit::new(transmittance(spectrum.deepest)).trial(spectrum.coefficients, color).residual;
             assert!(residual.abs().max_element() < 1e-14, "{rgb:?}: {residual}");
         }
     }
 
     #[test]
     fn the_jacobian_is_that_of_the_color() {
-        let fit = Fit::new(3.0);
+        let fit = Fit::new(transmittance(3.0));
         let c = DVec3::new(0.3, -1.2, 2.0);
         let here = fit.trial(c, DVec3::ZERO);
         for i in 0..3 {

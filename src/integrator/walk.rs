@@ -1,0 +1,235 @@
+//! A ray on its way from surface to surface, with the media around it and the surfaces that it stands on.
+//!
+//! What every integrator's rays have in common: what the camera does not see, glass that touches what is behind it, cemented
+//! faces, priorities. Which way a ray goes on is its caller's business.
+
+use glam::DVec3;
+
+use super::chain::{Counters, Follower};
+use crate::camera::Sight;
+use crate::geometry::{Departures, Hit, Ray};
+use crate::optics::media::{Inside, MediaStack, MediumId};
+use crate::ray::{LocalSurface, RayStart};
+use crate::scene::view::{Presence, View};
+
+/// Straight crossings (cut-outs, surfaces inside a medium of higher priority) that one chain may make.
+pub(super) const MAX_CROSSINGS: u32 = 4096;
+
+/// Coincident surfaces that are taken together; more are met one by one.
+const MAX_COINCIDENT: u32 = 8;
+
+/// A point on a surface, as a ray met it.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// Which surface, and where on it.
+    pub hit: Hit,
+    /// Render space.
+    pub point: DVec3,
+    /// The surface about the point.
+    pub surface: LocalSurface,
+    /// 1-based, 0 for none.
+    pub material_id: u32,
+    /// What it is there.
+    pub presence: Presence,
+}
+
+/// A ray on its way, with the media around it.
+pub(super) struct Walk<'a> {
+    pub(super) view: &'a View<'a>,
+    pub(super) ray: Ray,
+    pub(super) media: MediaStack,
+    pub(super) departures: Departures,
+    /// From the last event to the last surface met.
+    pub(super) travelled: f64,
+    pub(super) crossings: u32,
+    /// Where the camera sees surfaces; `None` once the ray was refracted or reflected, or where it sees all.
+    sight: Option<Sight>,
+    /// How far from its start the ray begins: behind the last surface that the camera does not see.
+    pub(super) begin: f64,
+    /// Whether `begin` has moved, and the media with it.
+    pub(super) begins_anew: bool,
+    /// Whether there were too many surfaces that the camera does not see.
+    pub(super) is_lost: bool,
+}
+
+impl<'a> Walk<'a> {
+    pub(super) fn new(follower: &Follower<'a>, start: &RayStart) -> Self {
+        Self {
+            view: follower.view,
+            ray: Ray { origin: start.point, direction: start.direction, time: start.time },
+            media: follower.media_around(start),
+            departures: Departures::none(),
+            travelled: 0.0,
+            crossings: 0,
+            sight: follower.sight(start),
+            begin: 0.0,
+            begins_anew: false,
+            is_lost: false,
+        }
+    }
+
+    /// The next surface that is seen.
+    pub(super) fn advance(&mut self, counters: &mut Counters) -> Option<SurfacePoint> {
+        loop {
+            counters.rays += 1;
+            let hit = self.view.intersect(&self.ray, &self.departures)?;
+            let (point, surface) = self.view.aggregate.local_surface(&self.ray, &hit);
+            self.travelled += hit.distance;
+            let material_id = self.view.material_id(&hit);
+            let met = SurfacePoint { hit, point, surface, material_id, presence: Presence::AsStated };
+            let seen = |met: SurfacePoint| SurfacePoint { presence: self.view.presence(&met.hit, material_id), ..met };
+            let Some(sight) = self.sight else { return Some(seen(met)) };
+            if self.travelled > sight.far {
+                counters.unseen += 1;
+                return None;
+            }
+            if self.travelled >= sight.near && !self.view.is_hidden_from_camera(&hit) {
+                return Some(seen(met));
+            }
+            self.overlook(&met, counters);
+            if self.crossings > MAX_CROSSINGS {
+                self.is_lost = true;
+                return None;
+            }
+        }
+    }
+
+    /// Goes straight on through a surface that the camera does not see, into the media behind it.
+    fn overlook(&mut self, met: &SurfacePoint, counters: &mut Counters) {
+        counters.unseen += 1;
+        match self.view.inside(&met.hit, met.material_id) {
+            Some(inside) if met.hit.leaving => counters.unmatched_exits += u64::from(!self.media.leave(&inside)),
+            Some(inside) => self.media.enter(inside),
+            None => {}
+        }
+        self.cross(met);
+        (self.begin, self.begins_anew) = (self.travelled, true);
+    }
+
+    /// What is seen from inside of a glass where `met` is its surface: an opaque surface or a mirror that coincides with it,
+    /// or itself. Without this, rounding would decide for each ray whether glass that stands on a table touches it.
+    pub(super) fn in_contact(&self, met: SurfacePoint, counters: &mut Counters) -> SurfacePoint {
+        let bounds_glass = |hit: &Hit, id: u32| self.view.inside(hit, id).is_some();
+        if !met.hit.leaving || !self.view.is_in_contact(&met.hit) || !bounds_glass(&met.hit, met.material_id) {
+            return met;
+        }
+        let ahead = Ray { origin: met.point, ..self.ray };
+        let mut departures = self.departures;
+        departures.depart(&self.ray, &met.hit, true);
+        for _ in 0..MAX_COINCIDENT {
+            counters.rays += 1;
+            let Some(hit) = self.view.coincident_backing(&ahead, &departures) else { break };
+            let material_id = self.view.material_id(&hit);
+            let presence = self.view.presence(&hit, material_id);
+            if self.view.is_backing(material_id) && presence != Presence::Absent {
+                let (point, surface) = self.view.aggregate.local_surface(&ahead, &hit);
+                // Met where the glass was, by the ray that met the glass.
+                let hit = Hit { distance: met.hit.distance, at_start: met.hit.at_start, ..hit };
+                return SurfacePoint { hit, point, surface, material_id, presence };
+            }
+            departures.depart(&ahead, &hit, hit.leaving);
+        }
+        met
+    }
+
+    /// Goes straight on through the surface.
+    pub(super) fn cross(&mut self, met: &SurfacePoint) {
+        self.crossings += 1;
+        self.departures.depart(&self.ray, &met.hit, met.hit.leaving);
+        self.ray.origin = met.point;
+    }
+
+    /// Goes on from the surface in a new direction, a unit vector. Whatever goes to the far side has [passed](Self::pass)
+    /// already.
+    pub(super) fn turn(&mut self, met: &SurfacePoint, direction: DVec3, has_passed: bool) {
+        if !has_passed {
+            self.departures.depart(&self.ray, &met.hit, !met.hit.leaving);
+        }
+        self.ray = Ray { origin: met.point, direction, ..self.ray };
+        (self.travelled, self.begin, self.sight) = (0.0, 0.0, None);
+    }
+
+    /// What lies behind the surface, together with all glass that coincides with it: two cemented faces are one interface
+    /// between their media, in whatever order rounding presents them.
+    pub(super) fn far_side(&self, met: &SurfacePoint, counters: &mut Counters) -> FarSide {
+        let inside = self.view.inside(&met.hit, met.material_id);
+        if !self.view.is_touching(&met.hit) {
+            // Nothing coincides: the stack is asked, not copied.
+            let medium = match inside {
+                Some(inside) if met.hit.leaving => self.media.preview_leave(&inside).unwrap_or_else(|_| {
+                    counters.unmatched_exits += 1;
+                    self.media.current()
+                }),
+                Some(inside) => self.media.preview_enter(&inside),
+                None => self.media.current(),
+            };
+            return FarSide { medium, inside, cluster: None };
+        }
+        let mut cluster = Cluster { media: self.media.clone(), departures: self.departures };
+        let mut is_alone = true;
+        self.include(&mut cluster, &met.hit, inside, counters);
+        let ahead = Ray { origin: met.point, ..self.ray };
+        for _ in 0..MAX_COINCIDENT {
+            counters.rays += 1;
+            let Some(hit) = self.view.intersect(&ahead, &cluster.departures).filter(|hit| hit.at_start) else { break };
+            let inside = self.view.inside(&hit, self.view.material_id(&hit));
+            if inside.is_none() {
+                break;
+            }
+            is_alone = false;
+            self.include(&mut cluster, &hit, inside, counters);
+        }
+        if let Some(inside) = inside
+            && met.hit.leaving
+            && is_alone
+        {
+            counters.undecided_overlaps += u64::from(self.media.is_undecided(&inside));
+        }
+        FarSide { medium: cluster.media.current(), inside, cluster: Some(cluster) }
+    }
+
+    fn include(&self, cluster: &mut Cluster, hit: &Hit, inside: Option<Inside>, counters: &mut Counters) {
+        cluster.departures.depart(&self.ray, hit, hit.leaving);
+        match inside {
+            Some(inside) if hit.leaving => counters.unmatched_exits += u64::from(!cluster.media.leave(&inside)),
+            Some(inside) => cluster.media.enter(inside),
+            None => {}
+        }
+    }
+
+    /// Goes to the far side; the direction is the caller's.
+    pub(super) fn pass(&mut self, met: &SurfacePoint, far: FarSide) {
+        self.crossings += 1;
+        self.ray.origin = met.point;
+        match (far.cluster, far.inside) {
+            (Some(cluster), _) => {
+                self.media = cluster.media;
+                self.departures = cluster.departures;
+            }
+            (None, inside) => {
+                self.departures.depart(&self.ray, &met.hit, met.hit.leaving);
+                match inside {
+                    // What was never entered is not left; the look has counted it.
+                    Some(inside) if met.hit.leaving => drop(self.media.leave(&inside)),
+                    Some(inside) => self.media.enter(inside),
+                    None => {}
+                }
+            }
+        }
+    }
+}
+
+/// The far side of an interface.
+pub(super) struct FarSide {
+    pub(super) medium: Option<MediumId>,
+    /// What the surface that was met bounds.
+    inside: Option<Inside>,
+    /// Where several surfaces coincide: the state behind all of them.
+    cluster: Option<Cluster>,
+}
+
+/// The state of a walk behind coincident surfaces.
+struct Cluster {
+    media: MediaStack,
+    departures: Departures,
+}
