@@ -42,6 +42,7 @@ pub fn build(description: Description) -> Result<Scene> {
     let mut resources = Resources::new(&description);
     let (materials, material_ids) = build_materials(document, placed(), &mut resources, &mut diagnostics)?;
     let display_color = material::display_color(&mut resources);
+    let display_surface = material::display_surface(&mut resources);
     let Resources { store: textures, primvars, .. } = resources;
     let mut has_interior = vec![false; document.shapes.len()];
     placed().for_each(|p| has_interior[p.shape] |= is_medium(p.placement, &materials, &material_ids));
@@ -121,6 +122,7 @@ pub fn build(description: Description) -> Result<Scene> {
         materials,
         textures,
         display_color,
+        display_surface,
         prims,
         instances,
         skipped,

@@ -553,7 +553,7 @@ pub struct NodeOutput {
 }
 
 /// A surface shader as authored.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shader {
     /// Prim path.

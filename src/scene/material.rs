@@ -10,7 +10,9 @@ mod dialect;
 mod law;
 mod network;
 mod nodes;
+mod painter;
 mod resources;
+mod surface;
 #[cfg(test)]
 mod tests;
 mod values;
@@ -21,13 +23,16 @@ use crate::optics::dispersion::{Dispersion, OutOfRange};
 use crate::optics::media::Priority;
 use crate::optics::{Absorption, Extinction, catalog};
 use crate::scene::description::{self, Shader};
-use crate::texture::{Builder, Program};
+use crate::texture::{Builder, Program, TooLarge};
 
 pub use appearance::{Appearance, Below, Opacity};
-use dialect::{Glass, Response, Surface};
+use dialect::{Glass, Response, Terminal};
 use law::{Authored, StatedAbsorption};
 use network::Networks;
-pub(in crate::scene) use resources::Resources;
+use painter::Painter;
+pub(in crate::scene) use resources::{Resources, source};
+use surface::IndexOf;
+pub use surface::{Surface, SurfaceAt};
 use values::Values;
 
 /// From this weight on a surface counts as what the weight says: transmissive, metallic, present.
@@ -79,6 +84,8 @@ pub struct Material {
     pub chosen: String,
     /// What is looked up where a ray meets it.
     pub appearance: Appearance,
+    /// What light transport meets.
+    pub surface: Surface,
 }
 
 impl Material {
@@ -153,6 +160,18 @@ pub(super) fn display_color(resources: &mut Resources<'_>) -> Program {
     compile().expect("two operations are not too many")
 }
 
+/// The surface of what has no material: diffuse, of the colour that [`display_color`] is.
+pub(super) fn display_surface(resources: &mut Resources<'_>) -> Surface {
+    let mut networks = Networks::default();
+    let b = &mut networks.builder;
+    let mut color = || {
+        let grey = b.constant(appearance::UNSTATED)?;
+        b.primvar(resources.primvar("displayColor"), grey)
+    };
+    let color = color().expect("two operations are not too many");
+    Surface::diffuse(color, &mut networks)
+}
+
 /// Compiles what was authored. Errors name the prim and attribute, and what to author instead.
 pub(super) fn compile(
     material: &description::Material,
@@ -161,22 +180,34 @@ pub(super) fn compile(
     diagnostics: &mut Diagnostics,
 ) -> Result<Material> {
     let terminals: Vec<&Shader> = material.surface.iter().chain(&material.alternatives).collect();
-    let mut surface = terminals.iter().find_map(|shader| Surface::of(shader));
+    let mut surface = terminals.iter().find_map(|shader| Terminal::of(shader));
     let mut networks = Networks::default();
     if let Some(surface) = &mut surface {
         networks = Networks::compile(surface.shader(), &material.nodes, resources)?;
         surface.look_up(|name| networks.register(name).is_some());
     }
-    let (kind, chosen) = classify(material, &terminals, surface.as_ref(), context, diagnostics)?;
-    let appearance = match &surface {
+    let (kind, metal, chosen) = classify(material, &terminals, surface.as_ref(), context, diagnostics)?;
+    let (appearance, surface) = match &surface {
         Some(surface) => {
             let is_glass = matches!(kind, Kind::Dielectric { .. });
             let opacity = surface.opacity(diagnostics)?;
-            Appearance::of(surface.shader(), &mut networks, is_glass, opacity, diagnostics)
+            let mut painter = Painter::new(surface.shader(), &mut networks, diagnostics).after(surface.defaulted());
+            let appearance = Appearance::of(&mut painter, is_glass, opacity);
+            let index = match &kind {
+                Kind::Dielectric { thin_walled: false, .. } => IndexOf::Media,
+                Kind::Dielectric { dispersion, .. } => IndexOf::Wall(dispersion),
+                _ => IndexOf::Shader,
+            };
+            let compiled = surface.layers(&mut painter).and_then(|l| Surface::compile(&l, metal, index, &mut painter));
+            let compiled = compiled.unwrap_or_else(|TooLarge| {
+                painter.warn("", "the networks of its surface are too large");
+                Surface::unstated()
+            });
+            (appearance, compiled)
         }
-        None => Appearance::unstated(),
+        None => (Appearance::unstated(), Surface::unstated()),
     };
-    Ok(Material { path: material.path.clone(), kind, chosen, appearance })
+    Ok(Material { path: material.path.clone(), kind, chosen, appearance, surface })
 }
 
 /// A material by itself: nothing of it is an image.
@@ -196,15 +227,16 @@ fn compile_alone(
     compile(material, context, &mut Resources::new(&description), diagnostics)
 }
 
+/// The kind, the metal where one is stated, rough or not, and why.
 fn classify(
     material: &description::Material,
     terminals: &[&Shader],
-    surface: Option<&Surface<'_>>,
+    surface: Option<&Terminal<'_>>,
     context: &Context,
     diagnostics: &mut Diagnostics,
-) -> Result<(Kind, String)> {
+) -> Result<(Kind, Option<Conductor>, String)> {
     let mut places = vec![Values::new(&material.abbe, &material.path, "")];
-    if let Some(shader) = surface.map(Surface::shader).or(material.surface.as_ref()) {
+    if let Some(shader) = surface.map(Terminal::shader).or(material.surface.as_ref()) {
         places.push(Values::new(&shader.abbe, &shader.path, "inputs:"));
     }
     places.push(Values::new(&material.interface_abbe, &material.path, "inputs:"));
@@ -217,9 +249,10 @@ fn classify(
             _ => warn_of_unknown(terminals, diagnostics),
         };
         warn_of_idle_law(material, &authored, &reason, diagnostics)?;
-        return Ok((Kind::Opaque, format!("opaque: {reason}")));
+        return Ok((Kind::Opaque, None, format!("opaque: {reason}")));
     };
     let response = surface.response(diagnostics)?;
+    let mut metal = None;
     let uses_law = matches!(response, Response::Transmissive { .. } | Response::Metal { .. });
     let (kind, reason) = match response {
         Response::Transmissive { why, rough, thin_walled } => {
@@ -247,6 +280,7 @@ fn classify(
                 Some((conductor, source)) => (Some(conductor), format!("; n + ik from {source}")),
                 None => (None, String::new()),
             };
+            metal.clone_from(&conductor);
             match rough {
                 false => (Kind::Mirror { conductor }, format!("mirror: {why}, smooth{source}")),
                 true => (Kind::Opaque, format!("opaque: {why}, rougher than {SMOOTH_ROUGHNESS}{source}")),
@@ -258,7 +292,7 @@ fn classify(
     if !uses_law {
         warn_of_idle_law(material, &authored, &reason, diagnostics)?;
     }
-    Ok((kind, format!("{reason}{}", passed_over(terminals, surface.shader()))))
+    Ok((kind, metal, format!("{reason}{}", passed_over(terminals, surface.shader()))))
 }
 
 /// Says that none of the terminals leads to a shader that is understood; returns it for the plan.
@@ -285,7 +319,7 @@ fn passed_over(terminals: &[&Shader], used: &Shader) -> String {
 
 /// The index of a transmissive surface and where it comes from.
 fn dispersion(
-    surface: &Surface<'_>,
+    surface: &Terminal<'_>,
     shader: &description::Shader,
     authored: &Authored<'_>,
     scalar_ior: ScalarIor,
@@ -353,7 +387,7 @@ fn nearest_glass(glass: &Glass, diagnostics: &mut Diagnostics) -> Result<Option<
 
 /// The metal that our attributes state, and where; `None` where they say nothing of it, or half.
 fn conductor(
-    surface: &Surface<'_>,
+    surface: &Terminal<'_>,
     authored: &Authored<'_>,
     diagnostics: &mut Diagnostics,
 ) -> Result<Option<(Conductor, String)>> {

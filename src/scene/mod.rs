@@ -40,6 +40,8 @@ pub struct Scene {
     pub textures: Arc<Store>,
     /// The albedo of what has no material: the primvar `displayColor`.
     pub display_color: Program,
+    /// What light transport meets where there is no material: a diffuse surface of that colour.
+    pub display_surface: material::Surface,
     /// Prim paths behind `prim_id`.
     pub prims: Manifest,
     /// Instance paths behind `instance_id`.

@@ -5,13 +5,14 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use glam::DVec3;
 
 use super::Scene;
-use super::material::{Below, Kind, Material};
+use super::material::{Below, Kind, Material, Surface, SurfaceAt};
+use crate::bsdf::Interface;
 use crate::error::{Error, Result};
 use crate::geometry::{Aggregate, Departures, Hit, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
-use crate::spectrum::Wavelength;
-use crate::texture::Program;
+use crate::spectrum::{Wavelength, Wavelengths};
+use crate::texture::{MAX_RESULTS, Program};
 
 /// The direction of the one fixed ray that finds the media around the camera: no axis or diagonal that scenes are built on.
 const PARITY_DIRECTION: DVec3 = DVec3::new(0.267_261_241_912_424_4, 0.534_522_483_824_848_8, 0.801_783_725_737_273_2);
@@ -153,6 +154,13 @@ impl<'a> View<'a> {
         [r, g, b].map(f64::from)
     }
 
+    /// What the material `id` of the surface at `hit` emits: linear Rec. 709 by luminance; `None` where it has no emission.
+    pub fn emission(&self, hit: &Hit, id: u32) -> Option<[f64; 3]> {
+        let program = self.scene.materials[id.checked_sub(1)? as usize].appearance.emission.as_ref()?;
+        let [r, g, b, _] = self.evaluate(program, hit);
+        Some([r, g, b].map(|x| if x > 0.0 && x.is_finite() { f64::from(x) } else { 0.0 }))
+    }
+
     /// Whether the surface at `hit`, whose material is `id`, is as its material says, something else, or not there.
     pub fn presence(&self, hit: &Hit, id: u32) -> Presence {
         let Some(index) = id.checked_sub(1) else { return Presence::AsStated };
@@ -172,12 +180,49 @@ impl<'a> View<'a> {
         }
     }
 
+    /// What the surface at `hit`, whose material is `id`, is made of at the wavelengths of a path. `interface` has the media
+    /// on the side that the path comes from and on the other side; where the surface bounds none that counts, the index of
+    /// its own shader takes the place of `ior_t`.
+    pub fn surface<const N: usize>(
+        &self,
+        hit: &Hit,
+        id: u32,
+        wavelengths: &Wavelengths<N>,
+        interface: Interface<N>,
+    ) -> SurfaceAt<N> {
+        let surface = self.surface_of(id);
+        surface.at(&self.looked_up(surface, hit), wavelengths, interface)
+    }
+
+    /// The share of the surface at `hit` that is there, 0..=1: 1 − this goes straight on, as if nothing were met. The same as
+    /// [`SurfaceAt::presence`], for rays that only ask what is in their way.
+    pub fn share_present(&self, hit: &Hit, id: u32) -> f32 {
+        let surface = self.surface_of(id);
+        if surface.is_present() { 1.0 } else { surface.presence(&self.looked_up(surface, hit)) }
+    }
+
+    fn surface_of(&self, id: u32) -> &'a Surface {
+        match id.checked_sub(1) {
+            Some(index) => &self.scene.materials[index as usize].surface,
+            None => &self.scene.display_surface,
+        }
+    }
+
+    fn looked_up(&self, surface: &Surface, hit: &Hit) -> [[f32; 4]; MAX_RESULTS] {
+        let programs = surface.looked_up();
+        programs.map_or([[0.0; 4]; MAX_RESULTS], |programs| programs.at(&self.scene.textures, self.primvars(hit)))
+    }
+
     fn evaluate(&self, program: &Program, hit: &Hit) -> [f32; 4] {
-        program.at(&self.scene.textures, |number| {
+        program.at(&self.scene.textures, self.primvars(hit))
+    }
+
+    fn primvars(&self, hit: &Hit) -> impl Fn(u32) -> Option<[f32; 4]> {
+        move |number| {
             let number = number as usize;
             let over_shape = self.aggregate.primvar(hit, number);
             over_shape.or_else(|| self.scene.objects.primvar(hit.instance, number))
-        })
+        }
     }
 
     /// The medium behind the surface at `hit`, if its material `id` (1-based) fills a volume.

@@ -10,6 +10,10 @@ use super::store::Store;
 
 /// The longest program.
 pub const MAX_OPERATIONS: usize = 256;
+/// The longest bundle of programs.
+const MAX_BUNDLED: usize = 1024;
+/// The most results of a bundle.
+pub const MAX_RESULTS: usize = 40;
 /// The most operations of all programs of one builder.
 const MAX_ALL: usize = 4096;
 
@@ -194,26 +198,39 @@ impl Builder {
 
     /// The program whose result is `root`: what it needs of the operations, and no more.
     pub fn program(&self, root: Register) -> Result<Program, TooLarge> {
-        let root = usize::from(root.0);
-        let mut needed = vec![false; root + 1];
-        needed[root] = true;
-        for i in (0..=root).rev() {
+        let Bundle { operations, lookups, .. } = self.needed(&[root]);
+        if operations.len() > MAX_OPERATIONS { Err(TooLarge) } else { Ok(Program { operations, lookups }) }
+    }
+
+    /// The programs of several registers in one, what they share computed once.
+    pub fn bundle(&self, roots: &[Register]) -> Result<Bundle, TooLarge> {
+        let bundle = self.needed(roots);
+        let fits = bundle.operations.len() <= MAX_BUNDLED && roots.len() <= MAX_RESULTS;
+        if fits { Ok(bundle) } else { Err(TooLarge) }
+    }
+
+    /// What `roots` need; of a single one the last operation is its own.
+    fn needed(&self, roots: &[Register]) -> Bundle {
+        let end = roots.iter().map(|root| usize::from(root.0) + 1).max().unwrap_or(0);
+        let mut needed = vec![false; end];
+        roots.iter().for_each(|root| needed[usize::from(root.0)] = true);
+        for i in (0..end).rev() {
             if needed[i] {
                 self.operations[i].operands().for_each(|r| needed[usize::from(r.0)] = true);
             }
         }
-        let mut place = vec![Register(0); root + 1];
+        let mut place = vec![Register(0); end];
         let mut lookup_place = vec![None; self.lookups.len()];
-        let mut program = Program { operations: Vec::new(), lookups: Vec::new() };
-        for (i, operation) in self.operations[..=root].iter().enumerate().filter(|(i, _)| needed[*i]) {
+        let (mut operations, mut lookups) = (Vec::new(), Vec::new());
+        for (i, operation) in self.operations[..end].iter().enumerate().filter(|(i, _)| needed[*i]) {
             let at = |r: Register| place[usize::from(r.0)];
             let moved = match *operation {
                 Operation::Constant(value) => Operation::Constant(value),
                 Operation::Primvar(number, fallback) => Operation::Primvar(number, at(fallback)),
                 Operation::Texture(lookup, uv, fallback) => {
                     let lookup = *lookup_place[lookup as usize].get_or_insert_with(|| {
-                        program.lookups.push(self.lookups[lookup as usize].clone());
-                        (program.lookups.len() - 1) as u32
+                        lookups.push(self.lookups[lookup as usize].clone());
+                        (lookups.len() - 1) as u32
                     });
                     Operation::Texture(lookup, at(uv), at(fallback))
                 }
@@ -221,10 +238,11 @@ impl Builder {
                 Operation::Combine(of) => Operation::Combine(of.map(at)),
                 Operation::Function(function, of) => Operation::Function(function, of.map(at)),
             };
-            place[i] = Register(program.operations.len() as u16);
-            program.operations.push(moved);
+            place[i] = Register(operations.len() as u16);
+            operations.push(moved);
         }
-        if program.operations.len() > MAX_OPERATIONS { Err(TooLarge) } else { Ok(program) }
+        let results = roots.iter().map(|root| place[usize::from(root.0)]).collect();
+        Bundle { operations, lookups, results }
     }
 
     fn push(&mut self, operation: Operation) -> Result<Register, TooLarge> {
@@ -393,27 +411,90 @@ impl Program {
 
     /// The numbers of the images that it looks up.
     pub fn images(&self) -> impl Iterator<Item = u32> {
-        self.lookups.iter().flat_map(|lookup| match &lookup.images {
-            Images::Single(number) => vec![*number],
-            Images::Tiles(tiles) => tiles.iter().map(|tile| tile.1).collect(),
-        })
+        images(&self.lookups)
     }
 
     /// The value where `primvar` gives the primvars by their numbers.
     pub fn at(&self, store: &Store, primvar: impl Fn(u32) -> Option<[f32; 4]>) -> [f32; 4] {
         let mut registers = [[0.0; 4]; MAX_OPERATIONS];
-        for (i, operation) in self.operations.iter().enumerate() {
-            let get = |r: Register| registers[usize::from(r.0)];
-            registers[i] = match *operation {
-                Operation::Primvar(number, fallback) => primvar(number).unwrap_or_else(|| get(fallback)),
-                Operation::Texture(lookup, uv, fallback) => {
-                    let [u, v, ..] = get(uv);
-                    self.lookups[lookup as usize].at(store, [u, v]).unwrap_or_else(|| get(fallback))
-                }
-                _ => operation.value(get),
-            };
-        }
+        run(&self.operations, &self.lookups, store, primvar, &mut registers);
         registers[self.operations.len() - 1]
+    }
+}
+
+/// Several compiled inputs that are computed together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bundle {
+    operations: Vec<Operation>,
+    lookups: Vec<Lookup>,
+    results: Vec<Register>,
+}
+
+impl Bundle {
+    /// How many results there are.
+    pub fn len(&self) -> usize {
+        self.results.len()
+    }
+
+    /// Whether nothing is computed.
+    pub fn is_empty(&self) -> bool {
+        self.results.is_empty()
+    }
+
+    /// The numbers of the images that it looks up.
+    pub fn images(&self) -> impl Iterator<Item = u32> {
+        images(&self.lookups)
+    }
+
+    /// The results, where `primvar` gives the primvars by their numbers; what is beyond them is 0.
+    pub fn at(&self, store: &Store, primvar: impl Fn(u32) -> Option<[f32; 4]>) -> [[f32; 4]; MAX_RESULTS] {
+        // Registers are cleared before use: short bundles clear few.
+        match self.operations.len() {
+            0..=64 => self.within::<64>(store, primvar),
+            65..=256 => self.within::<256>(store, primvar),
+            _ => self.within::<MAX_BUNDLED>(store, primvar),
+        }
+    }
+
+    fn within<const M: usize>(
+        &self,
+        store: &Store,
+        primvar: impl Fn(u32) -> Option<[f32; 4]>,
+    ) -> [[f32; 4]; MAX_RESULTS] {
+        let mut registers = [[0.0; 4]; M];
+        run(&self.operations, &self.lookups, store, primvar, &mut registers);
+        let mut results = [[0.0; 4]; MAX_RESULTS];
+        for (result, register) in results.iter_mut().zip(&self.results) {
+            *result = registers[usize::from(register.0)];
+        }
+        results
+    }
+}
+
+fn images(lookups: &[Lookup]) -> impl Iterator<Item = u32> {
+    lookups.iter().flat_map(|lookup| match &lookup.images {
+        Images::Single(number) => vec![*number],
+        Images::Tiles(tiles) => tiles.iter().map(|tile| tile.1).collect(),
+    })
+}
+
+fn run(
+    operations: &[Operation],
+    lookups: &[Lookup],
+    store: &Store,
+    primvar: impl Fn(u32) -> Option<[f32; 4]>,
+    registers: &mut [[f32; 4]],
+) {
+    for (i, operation) in operations.iter().enumerate() {
+        let get = |r: Register| registers[usize::from(r.0)];
+        registers[i] = match *operation {
+            Operation::Primvar(number, fallback) => primvar(number).unwrap_or_else(|| get(fallback)),
+            Operation::Texture(lookup, uv, fallback) => {
+                let [u, v, ..] = get(uv);
+                lookups[lookup as usize].at(store, [u, v]).unwrap_or_else(|| get(fallback))
+            }
+            _ => operation.value(get),
+        };
     }
 }
 
@@ -455,6 +536,25 @@ mod tests {
         }
         let all = (0..2 * MAX_ALL).map(|i| builder.number(-(i as f32))).find(Result::is_err);
         assert_eq!(all, Some(Err(TooLarge)));
+    }
+
+    #[test]
+    fn a_bundle_has_the_results_of_its_programs_and_computes_shared_things_once() {
+        let mut builder = Builder::default();
+        let zero = builder.number(0.0).unwrap();
+        let st = builder.primvar(0, zero).unwrap();
+        let root = builder.unary(Function::Sqrt, st).unwrap();
+        let two = builder.number(2.0).unwrap();
+        let roots = [builder.binary(Function::Multiply, root, two).unwrap(), root];
+        let bundle = builder.bundle(&roots).unwrap();
+        assert_eq!((bundle.len(), bundle.operations.len()), (2, 5));
+        let primvar = |_| Some([4.0, 9.0, 0.0, 1.0]);
+        let results = bundle.at(&Store::default(), primvar);
+        for (result, root) in results.into_iter().zip(roots) {
+            let alone = builder.program(root).unwrap().at(&Store::default(), primvar);
+            assert_eq!(result.map(f32::to_bits), alone.map(f32::to_bits));
+        }
+        assert!(builder.bundle(&[]).unwrap().is_empty());
     }
 
     #[test]

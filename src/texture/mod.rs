@@ -10,6 +10,6 @@ mod sample;
 mod store;
 
 pub use color_space::ColorSpace;
-pub use graph::{Builder, Function, MAX_OPERATIONS, Program, Register, TooLarge};
+pub use graph::{Builder, Bundle, Function, MAX_OPERATIONS, MAX_RESULTS, Program, Register, TooLarge};
 pub use sample::{Images, Lookup, Wrap};
 pub use store::{DEFAULT_BUDGET, Source, Store, TextureCounts, Unreadable};

@@ -8,12 +8,12 @@
 
 use glam::{DVec3, Vec3};
 
-use super::frame::Frame;
-use super::media::{Laws, PathMedia};
-use super::surface;
 use crate::bsdf::{Bsdf, Interface, Scattered};
 use crate::geometry::Ray;
 use crate::integrator::chain::{Counters, Follower};
+use crate::integrator::frame::Frame;
+use crate::integrator::lanes::{Laws, PathMedia};
+use crate::integrator::surface;
 use crate::integrator::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
 use crate::light::Light;
 use crate::lighting::{LightHit, LightSample, Lighting, Receiver};
@@ -76,7 +76,10 @@ impl<const N: usize> State<N> {
             self.radiance += self.throughput * met.radiance * by_lanes;
             return;
         };
-        let pdf = lighting.pdf(&vertex.receiver, direction, met.light, met.distance);
+        if !lighting.is_linked(met.light, vertex.receiver.object) {
+            return;
+        }
+        let pdf = lighting.pdf(&vertex.receiver, direction, met);
         let mut seen = met.radiance;
         if let Some(light) = lighting.light(met.light)
             && has_factors(light)
@@ -140,12 +143,12 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
             let medium = self.media.of(walk.media.current());
             let ray = walk.ray;
-            if let Some(mut light) = self.lighting.intersect(&ray, limit, &wavelengths) {
+            self.lighting.along(&ray, limit, &wavelengths, &mut |mut light| {
                 if let Some(through) = medium.transmittance(light.distance) {
                     light.radiance *= through;
                 }
                 state.meet::<DISPERSIVE>(self.lighting, ray.direction, &light);
-            }
+            });
             let Some(met) = met else {
                 // What absorbs lets nothing through from infinitely far.
                 let absorbs = |sigma: &SampledSpectrum<N>| sigma.0.iter().any(|&sigma| sigma > 0.0);
@@ -284,7 +287,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 ((scattering.momentum_out / ior).normalize(), passes)
             }
             Scattered::Straight => {
-                // No vertex: light that was sampled comes through as well.
+                state.vertex = None;
                 walk.cross(met);
                 return self.survives(state, *vertices, u_roulette);
             }
@@ -388,7 +391,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             if set.is_some_and(|set| !view.scene.is_linked(set, hit.instance)) {
                 return false;
             }
-            match surface::through(view, hit, wavelengths, numbers) {
+            match surface::through::<N>(view, hit, numbers) {
                 None => false,
                 Some(part) if part.is_black() => {
                     nearest = nearest.min(hit.distance);

@@ -4,7 +4,7 @@
 //! `abbe:glass` names, which are physical lengths; then what the shader states, whose depth is in stage units.
 
 use super::Context;
-use super::dialect::Surface;
+use super::dialect::Terminal;
 use super::law::{Authored, StatedAbsorption};
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
@@ -12,7 +12,7 @@ use crate::optics::{Absorption, Extinction};
 
 /// The absorption of a transmissive surface's inside with where it comes from; `None` where it is clear.
 pub(super) fn absorption(
-    surface: &Surface<'_>,
+    surface: &Terminal<'_>,
     authored: &Authored<'_>,
     thin_walled: bool,
     context: &Context,

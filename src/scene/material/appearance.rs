@@ -3,11 +3,9 @@
 //! One table of the shading models' inputs with the defaults of their node definitions; a program for each thing that is
 //! asked of a surface. An input that is driven by a network that is not understood has its default, with a warning.
 
-use crate::diagnostics::Diagnostics;
-use crate::scene::description::Shader;
-use crate::texture::{Builder, Function as F, Program, Register, TooLarge};
+use crate::texture::{Function as F, Program, Register, TooLarge};
 
-use super::network::Networks;
+use super::painter::Painter;
 use super::values::Values;
 
 /// What Hydra gives surfaces that say nothing of their colour, and UsdPreviewSurface's default.
@@ -177,20 +175,12 @@ impl Appearance {
         }
     }
 
-    /// Of `shader`, whose driven inputs are `networks`. `is_glass` tells that the whole surface transmits by its opacity;
+    /// Of the shader that `painter` reads. `is_glass` tells that the whole surface transmits by its opacity;
     /// `opacity` is the input that decides it from point to point.
-    pub(super) fn of(
-        shader: &Shader,
-        networks: &mut Networks,
-        is_glass: bool,
-        opacity: Option<OpacityInput>,
-        diagnostics: &mut Diagnostics,
-    ) -> Self {
-        let Some(model) = MODELS.iter().find(|model| model.ids.contains(&shader.id.as_str())) else {
+    pub(super) fn of(painter: &mut Painter<'_, '_, '_>, is_glass: bool, opacity: Option<OpacityInput>) -> Self {
+        let Some(model) = MODELS.iter().find(|model| model.ids.contains(&painter.id())) else {
             return if is_glass { Self::clear() } else { Self::unstated() };
         };
-        let values = Values::new(&shader.inputs, &shader.path, "inputs:");
-        let mut painter = Painter { shader, values, networks, diagnostics };
         let painted = painter.paint(model, is_glass, opacity);
         painted.unwrap_or_else(|TooLarge| {
             painter.warn("", "the networks of its surface are too large");
@@ -205,16 +195,9 @@ impl Appearance {
     }
 }
 
-struct Painter<'a, 'n, 'd> {
-    shader: &'a Shader,
-    values: Values<'a>,
-    networks: &'n mut Networks,
-    diagnostics: &'d mut Diagnostics,
-}
-
-impl<'a> Painter<'a, '_, '_> {
+impl Painter<'_, '_, '_> {
     fn paint(&mut self, model: &Model, is_glass: bool, opacity: Option<OpacityInput>) -> Result<Appearance, TooLarge> {
-        let color = self.color(model.base_color.0, model.base_color.1)?;
+        let color = self.color(model.base_color)?;
         let weight = self.number(model.base_weight)?;
         let base = self.b().binary(F::Multiply, color, weight)?;
         let metallic = self.number(model.metallic)?;
@@ -242,7 +225,7 @@ impl<'a> Painter<'a, '_, '_> {
         } else if is_glass && model.transmission == NONE {
             albedo = white;
         }
-        let emission_color = self.color(model.emission_color.0, model.emission_color.1)?;
+        let emission_color = self.color(model.emission_color)?;
         let emission_weight = self.number(model.emission_weight)?;
         let emission = self.b().binary(F::Multiply, emission_color, emission_weight)?;
         let is_black = matches!(self.b().value(emission), Some([r, g, b, _]) if [r, g, b].iter().all(|&x| x == 0.0));
@@ -259,10 +242,6 @@ impl<'a> Painter<'a, '_, '_> {
         })
     }
 
-    fn b(&mut self) -> &mut Builder {
-        &mut self.networks.builder
-    }
-
     fn opacity(&mut self, input: OpacityInput) -> Result<(Register, Opacity), TooLarge> {
         let driven = self.networks.register(input.name).expect("only a network makes opacity differ");
         let register = if input.is_color {
@@ -277,14 +256,12 @@ impl<'a> Painter<'a, '_, '_> {
 
     /// (1 − max f₀) diffuse + f₀ in UsdPreviewSurface's specular workflow, else the base itself.
     fn specular_workflow(&mut self, base: Register) -> Result<Register, TooLarge> {
-        if !self.values.switch("useSpecularWorkflow").ok().flatten().unwrap_or(false) {
+        if !self.switch(("useSpecularWorkflow", false)) {
             return Ok(base);
         }
-        let specular = self.color("specularColor", [0.0; 3])?;
+        let specular = self.color(("specularColor", [0.0; 3]))?;
+        let [greatest, _] = self.extremes(specular)?;
         let b = self.b();
-        let [r, g, blue] = [b.swizzle(specular, "x")?, b.swizzle(specular, "y")?, b.swizzle(specular, "z")?];
-        let greatest = b.binary(F::Max, r, g)?;
-        let greatest = b.binary(F::Max, greatest, blue)?;
         let one = b.number(1.0)?;
         let rest = b.binary(F::Subtract, one, greatest)?;
         let diffuse = b.binary(F::Multiply, base, rest)?;
@@ -296,55 +273,10 @@ impl<'a> Painter<'a, '_, '_> {
         let (color, depth) = model.tint;
         let is_inside = !depth.is_empty()
             && (self.networks.register(depth).is_some()
-                || self.values.number(depth).ok().flatten().is_some_and(|depth| depth > 0.0));
+                || self.authored(depth, Values::number).is_some_and(|depth| depth > 0.0));
         if color.is_empty() || is_inside {
             return self.b().constant(WHITE);
         }
-        self.color(color, [1.0; 3])
-    }
-
-    fn color(&mut self, name: &str, default: [f32; 3]) -> Result<Register, TooLarge> {
-        if let Some(register) = self.driven(name) {
-            return Ok(register);
-        }
-        let authored = self.authored(name, Values::color).map(|rgb| rgb.map(|x| x as f32));
-        let [r, g, b] = authored.unwrap_or(default);
-        self.b().constant([r, g, b, 1.0])
-    }
-
-    fn number(&mut self, (name, default): (&str, f32)) -> Result<Register, TooLarge> {
-        if let Some(register) = self.driven(name) {
-            return self.b().swizzle(register, "x");
-        }
-        let authored = self.authored(name, Values::number);
-        self.b().number(authored.map_or(default, |x| x as f32))
-    }
-
-    /// An authored constant; what is no value of its type is warned of, and is none.
-    fn authored<T>(&mut self, name: &str, read: impl Fn(&Values<'a>, &str) -> crate::Result<Option<T>>) -> Option<T> {
-        if name.is_empty() || self.shader.connected.contains_key(name) {
-            return None;
-        }
-        read(&self.values, name).unwrap_or_else(|_| {
-            self.warn(name, "is no value of its type: its default is used");
-            None
-        })
-    }
-
-    /// What drives the input `name`; `None` where nothing does, or, with a warning, what is not understood.
-    fn driven(&mut self, name: &str) -> Option<Register> {
-        if name.is_empty() || !self.shader.connected.contains_key(name) {
-            return None;
-        }
-        let register = self.networks.register(name);
-        if register.is_none() {
-            let why = self.networks.obstacle(name).map_or_else(String::new, |obstacle| format!(" ({obstacle})"));
-            self.warn(name, &format!("is driven by a network that is not understood{why}: its default is used"));
-        }
-        register
-    }
-
-    fn warn(&mut self, name: &str, message: &str) {
-        self.diagnostics.warn("unread-network", self.values.place(name), message);
+        self.color((color, [1.0; 3]))
     }
 }

@@ -7,6 +7,8 @@ use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
 use super::super::Context;
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{Layers, isotropic, surface_tint};
 use super::Dialect;
 #[cfg(test)]
 use super::inputs::Declared;
@@ -45,6 +47,17 @@ impl Dialect for AbbeGlass {
             why: "AbbeGlass".to_owned(),
             rough: inputs.is_rough(ROUGHNESS, diagnostics)?,
             thin_walled: inputs.switch(THIN_WALLED, diagnostics)?,
+        })
+    }
+
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let (white, ior, roughness) = (p.gray(1.0)?, p.number(IOR)?, p.number(ROUGHNESS)?);
+        Ok(Layers {
+            alpha: isotropic(roughness, p)?,
+            transmission: p.constant(1.0)?,
+            transmission_tint: surface_tint(COLOR, DEPTH, p)?,
+            thin_walled: p.switch(THIN_WALLED),
+            ..Layers::plastic(white, ior, p)?
         })
     }
 

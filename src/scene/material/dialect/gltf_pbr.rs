@@ -7,6 +7,8 @@ use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
 use super::super::appearance::{Below, OpacityInput};
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{CoatLayer, FilmLayer, Layers, MetalLayer, SheenLayer, f0_of, isotropic};
 use super::super::{Context, THRESHOLD};
 use super::Dialect;
 #[cfg(test)]
@@ -24,6 +26,21 @@ const ROUGHNESS: Number = input("roughness", 1.0);
 const THICKNESS: Number = input("thickness", 0.0);
 const IOR: Number = input("ior", 1.5);
 const DISPERSION: Number = input("dispersion", 0.0);
+const BASE_COLOR: Color = input("base_color", [1.0; 3]);
+const SPECULAR: Number = input("specular", 1.0);
+const SPECULAR_COLOR: Color = input("specular_color", [1.0; 3]);
+const IRIDESCENCE: Number = input("iridescence", 0.0);
+const IRIDESCENCE_IOR: Number = input("iridescence_ior", 1.3);
+const IRIDESCENCE_THICKNESS: Number = input("iridescence_thickness", 100.0);
+const SHEEN_COLOR: Color = input("sheen_color", [0.0; 3]);
+const SHEEN_ROUGHNESS: Number = input("sheen_roughness", 0.0);
+const CLEARCOAT: Number = input("clearcoat", 0.0);
+const CLEARCOAT_ROUGHNESS: Number = input("clearcoat_roughness", 0.0);
+const EMISSIVE: Color = input("emissive", [0.0; 3]);
+const EMISSIVE_STRENGTH: Number = input("emissive_strength", 1.0);
+const ANISOTROPY_STRENGTH: Number = input("anisotropy_strength", 0.0);
+const ANISOTROPY_ROTATION: Number = input("anisotropy_rotation", 0.0);
+const NORMAL: &str = "normal";
 const COLOR: Color = input("attenuation_color", [1.0; 3]);
 const DISTANCE: &str = "attenuation_distance";
 
@@ -91,6 +108,60 @@ impl Dialect for GltfPbr {
         Ok(limit.map(cut_out))
     }
 
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let color = p.color(BASE_COLOR)?;
+        // F0 = min(((1 − n)/(1 + n))² specular_color, 1) specular.
+        let (ior, specular, specular_color) = (p.number(IOR)?, p.number(SPECULAR)?, p.color(SPECULAR_COLOR)?);
+        let f0 = f0_of(ior, p)?;
+        let (f0, white) = (p.multiply(specular_color, f0)?, p.gray(1.0)?);
+        let f0 = p.min(f0, white)?;
+        let f0 = p.multiply(f0, specular)?;
+        let clearcoat_roughness = p.number(CLEARCOAT_ROUGHNESS)?;
+        let coat = CoatLayer {
+            weight: p.number(CLEARCOAT)?,
+            color: p.gray(1.0)?,
+            ior: p.constant(1.5)?,
+            alpha: isotropic(clearcoat_roughness, p)?,
+            darkening: p.constant(0.0)?,
+        };
+        let sheen_roughness = p.number(SHEEN_ROUGHNESS)?;
+        let sheen = SheenLayer {
+            weight: p.constant(1.0)?,
+            color: p.color(SHEEN_COLOR)?,
+            roughness: p.square(sheen_roughness)?,
+        };
+        let film = FilmLayer {
+            weight: p.number(IRIDESCENCE)?,
+            thickness_nm: p.number(IRIDESCENCE_THICKNESS)?,
+            ior: p.number(IRIDESCENCE_IOR)?,
+        };
+        // KHR_materials_anisotropy: α_t = mix(α, 1, strength²), α_b = α.
+        let roughness = p.number(ROUGHNESS)?;
+        let (alpha, strength) = (p.square(roughness)?, p.number(ANISOTROPY_STRENGTH)?);
+        let (strength, one) = (p.square(strength)?, p.constant(1.0)?);
+        let along = p.mix(alpha, one, strength)?;
+        let (radians, turns) = (p.number(ANISOTROPY_ROTATION)?, p.constant(std::f32::consts::TAU.recip())?);
+        let (strength, emissive) = (p.number(EMISSIVE_STRENGTH)?, p.color(EMISSIVE)?);
+        let thickness = p.number(THICKNESS)?;
+        Ok(Layers {
+            metalness: p.number(METALLIC)?,
+            metal: MetalLayer::Tint { f0: color, f82: white },
+            schlick_f0: Some(f0),
+            alpha: [along, alpha],
+            transmission: p.number(TRANSMISSION)?,
+            transmission_tint: color,
+            thin_walled: p.b().value(thickness) == Some([0.0; 4]),
+            coat: Some(coat),
+            sheen: Some(sheen),
+            film: Some(film),
+            presence: presence(p)?,
+            emission: p.multiply(emissive, strength)?,
+            normal: p.network(NORMAL),
+            rotation: p.multiply(radians, turns)?,
+            ..Layers::plastic(color, ior, p)?
+        })
+    }
+
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {
         let dispersion = inputs.number(DISPERSION, diagnostics)?;
         if dispersion < 0.0 {
@@ -126,4 +197,16 @@ fn limit(inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Option<f6
         "BLEND" => Some(THRESHOLD),
         _ => None,
     })
+}
+
+/// 1 in the mode OPAQUE, cut at `alpha_cutoff` in MASK, alpha in BLEND.
+fn presence(p: &mut Painter<'_, '_, '_>) -> Painted {
+    match p.word(ALPHA_MODE, &["OPAQUE", "MASK", "BLEND"]) {
+        "MASK" => {
+            let (alpha, cutoff) = (p.number(ALPHA)?, p.number(ALPHA_CUTOFF)?);
+            p.is_at_least(alpha, cutoff)
+        }
+        "BLEND" => p.number(ALPHA),
+        _ => p.constant(1.0),
+    }
 }

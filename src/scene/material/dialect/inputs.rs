@@ -1,5 +1,6 @@
 //! Inputs of a shader, each read with its definition's default.
 
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fmt::Display;
 
@@ -26,6 +27,30 @@ pub(super) type Word = Input<&'static str>;
 
 pub(super) const fn input<T: Copy>(name: &'static str, default: T) -> Input<T> {
     Input { name, default }
+}
+
+impl From<Number> for (&'static str, f32) {
+    fn from(input: Number) -> Self {
+        (input.name, input.default as f32)
+    }
+}
+
+impl From<Color> for (&'static str, [f32; 3]) {
+    fn from(input: Color) -> Self {
+        (input.name, input.default.map(|x| x as f32))
+    }
+}
+
+impl From<Switch> for (&'static str, bool) {
+    fn from(input: Switch) -> Self {
+        (input.name, input.default)
+    }
+}
+
+impl From<Word> for (&'static str, &'static str) {
+    fn from(input: Word) -> Self {
+        (input.name, input.default)
+    }
 }
 
 /// An input of any type: a line of the table in `docs/materials.md`.
@@ -60,16 +85,23 @@ pub(super) struct Inputs<'a> {
     values: Values<'a>,
     /// Driven inputs that are looked up where a ray meets the surface.
     looked_up: BTreeSet<String>,
+    /// Driven inputs whose default was used, which has been said.
+    defaulted: RefCell<BTreeSet<String>>,
 }
 
 impl<'a> Inputs<'a> {
     pub(super) fn new(shader: &'a Shader) -> Self {
         let values = Values::new(&shader.inputs, &shader.path, "inputs:");
-        Self { shader, values, looked_up: BTreeSet::new() }
+        Self { shader, values, looked_up: BTreeSet::new(), defaulted: RefCell::default() }
     }
 
     pub(super) fn shader(&self) -> &'a Shader {
         self.shader
+    }
+
+    /// Driven inputs whose default was used, with a warning.
+    pub(super) fn defaulted(&self) -> BTreeSet<String> {
+        self.defaulted.borrow().clone()
     }
 
     /// Says which driven inputs can be looked up.
@@ -228,6 +260,7 @@ impl<'a> Inputs<'a> {
     fn is_driven(&self, name: &str, default: impl Display, diagnostics: &mut Diagnostics) -> bool {
         let driven = self.is_connected(name);
         if driven {
+            self.defaulted.borrow_mut().insert(name.to_owned());
             diagnostics.warn(
                 "textured-input",
                 self.place(name),

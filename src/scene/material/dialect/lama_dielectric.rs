@@ -9,6 +9,8 @@ use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
 use super::super::Context;
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{Layers, anisotropic, index_of};
 use super::Dialect;
 #[cfg(test)]
 use super::inputs::Declared;
@@ -20,6 +22,11 @@ const FRESNEL_MODE: Word = input("fresnelMode", "Artistic");
 const REFLECTIVITY: Number = input("reflectivity", 0.04);
 const IOR: Number = input("IOR", 1.5);
 const ROUGHNESS: Number = input("roughness", 0.1);
+const REFLECTION_TINT: Color = input("reflectionTint", [1.0; 3]);
+const TRANSMISSION_TINT: Color = input("transmissionTint", [1.0; 3]);
+const ANISOTROPY: Number = input("anisotropy", 0.0);
+const ROTATION: Number = input("rotation", 0.0);
+const NORMAL: &str = "normal";
 const COLOR: Color = input("absorptionColor", [1.0; 3]);
 const RADIUS: Number = input("absorptionRadius", 1.0);
 
@@ -45,6 +52,26 @@ impl Dialect for LamaDielectric {
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         let rough = inputs.is_rough(ROUGHNESS, diagnostics)?;
         Ok(Response::Transmissive { why: "LamaDielectric".to_owned(), rough, thin_walled: false })
+    }
+
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let (white, roughness, anisotropy) = (p.gray(1.0)?, p.number(ROUGHNESS)?, p.number(ANISOTROPY)?);
+        let ior = match p.word(FRESNEL_MODE, &["Artistic", "Scientific"]) {
+            "Scientific" => p.number(IOR)?,
+            _ => {
+                let f0 = p.number(REFLECTIVITY)?;
+                index_of(f0, p)?
+            }
+        };
+        Ok(Layers {
+            specular_color: p.color(REFLECTION_TINT)?,
+            alpha: anisotropic(roughness, anisotropy, p)?,
+            transmission: p.constant(1.0)?,
+            transmission_tint: p.color(TRANSMISSION_TINT)?,
+            normal: p.network(NORMAL),
+            rotation: p.number(ROTATION)?,
+            ..Layers::plastic(white, ior, p)?
+        })
     }
 
     /// Artistic: r = ((n − 1)/(n + 1))², so n = (1 + √r)/(1 − √r). Scientific: the index itself.

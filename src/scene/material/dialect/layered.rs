@@ -6,7 +6,8 @@ use crate::optics::media::Priority;
 
 use super::super::THRESHOLD;
 use super::super::appearance::{Below, OpacityInput};
-use super::inputs::{Color, Inputs, Integer, Number, Weight};
+use super::super::painter::{Painted, Painter};
+use super::inputs::{Color, Inputs, Integer, Number, Switch, Weight};
 use super::vocabulary::{Attenuation, Glass, Response};
 
 /// How light leaves a transmissive surface.
@@ -50,6 +51,18 @@ pub(super) fn layered(
 pub(super) fn holes(inputs: &Inputs<'_>, input: Number, is_color: bool) -> Option<OpacityInput> {
     let limit = THRESHOLD as f32;
     inputs.is_looked_up(input.name).then_some(OpacityInput { name: input.name, limit, below: Below::CutOut, is_color })
+}
+
+/// Of NVIDIA's materials: an opacity that counts where it is enabled, as it is, or cut at a threshold beyond 0.
+pub(super) fn presence(p: &mut Painter<'_, '_, '_>, enabled: Switch, opacity: Number, threshold: Number) -> Painted {
+    if !p.switch(enabled) {
+        return p.constant(1.0);
+    }
+    let (opacity, threshold) = (p.number(opacity)?, p.number(threshold)?);
+    match p.b().value(threshold) {
+        Some([number, ..]) if number <= 0.0 => Ok(opacity),
+        _ => p.is_at_least(opacity, threshold),
+    }
 }
 
 /// The index of refraction, positive.

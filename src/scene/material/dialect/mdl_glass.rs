@@ -8,6 +8,8 @@ use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
 use super::super::Context;
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{Layers, isotropic};
 use super::Dialect;
 #[cfg(test)]
 use super::inputs::Declared;
@@ -19,6 +21,7 @@ const ROUGHNESS: Number = input("roughness", 0.0);
 const IOR: Number = input("ior", 1.4);
 const ABBE_NUMBER: Number = input("abbe_number", 0.0);
 const COLOR: Color = input("glass_color", [0.95; 3]);
+const TRANSMISSION_COLOR: Color = input("transmission_color", [1.0; 3]);
 const THICKNESS: Number = input("base_thickness", 0.1);
 
 /// Solid.
@@ -46,6 +49,17 @@ impl Dialect for ThickGlass {
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         let rough = inputs.is_rough(ROUGHNESS, diagnostics)?;
         Ok(Response::Transmissive { why: "thick glass".to_owned(), rough, thin_walled: false })
+    }
+
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let (white, ior, roughness) = (p.gray(1.0)?, p.number(IOR)?, p.number(ROUGHNESS)?);
+        Ok(Layers {
+            alpha: isotropic(roughness, p)?,
+            transmission: p.constant(1.0)?,
+            transmission_tint: p.color(TRANSMISSION_COLOR)?,
+            thin_walled: false,
+            ..Layers::plastic(white, ior, p)?
+        })
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {
@@ -81,6 +95,17 @@ impl Dialect for ThinGlass {
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         let rough = inputs.is_rough(ROUGHNESS, diagnostics)?;
         Ok(Response::Transmissive { why: "thin glass".to_owned(), rough, thin_walled: true })
+    }
+
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let (white, ior, roughness) = (p.gray(1.0)?, p.number(IOR)?, p.number(ROUGHNESS)?);
+        Ok(Layers {
+            alpha: isotropic(roughness, p)?,
+            transmission: p.constant(1.0)?,
+            transmission_tint: p.color(TRANSMISSION_COLOR)?,
+            thin_walled: true,
+            ..Layers::plastic(white, ior, p)?
+        })
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {

@@ -25,6 +25,8 @@ mod tests;
 mod vocabulary;
 mod vray_mtl;
 
+use std::collections::BTreeSet;
+
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 use crate::optics::media::Priority;
@@ -32,6 +34,8 @@ use crate::scene::description::Shader;
 
 use super::Context;
 use super::appearance::OpacityInput;
+use super::painter::{Painted, Painter};
+use super::surface::Layers;
 #[cfg(test)]
 use inputs::Declared;
 use inputs::Inputs;
@@ -48,6 +52,9 @@ trait Dialect: Sync {
 
     /// What the surface does to light.
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response>;
+
+    /// What the surface is made of.
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers>;
 
     /// The index and dispersion of a transmissive surface.
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass>;
@@ -87,12 +94,12 @@ const DIALECTS: &[&dyn Dialect] = &[
 ];
 
 /// A shader whose dialect is understood.
-pub(super) struct Surface<'a> {
+pub(super) struct Terminal<'a> {
     dialect: &'static dyn Dialect,
     inputs: Inputs<'a>,
 }
 
-impl<'a> Surface<'a> {
+impl<'a> Terminal<'a> {
     /// `None` if the shader's identifier is unknown.
     pub(super) fn of(shader: &'a Shader) -> Option<Self> {
         let dialect = DIALECTS.iter().find(|dialect| dialect.ids().contains(&shader.id.as_str()))?;
@@ -107,6 +114,16 @@ impl<'a> Surface<'a> {
     /// The input that says where the surface is there, if that is looked up from point to point.
     pub(super) fn opacity(&self, diagnostics: &mut Diagnostics) -> Result<Option<OpacityInput>> {
         self.dialect.opacity(&self.inputs, diagnostics)
+    }
+
+    /// Driven inputs whose default was used, with a warning.
+    pub(super) fn defaulted(&self) -> BTreeSet<String> {
+        self.inputs.defaulted()
+    }
+
+    /// What the surface is made of.
+    pub(super) fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        self.dialect.layers(p)
     }
 
     /// The shader itself.

@@ -11,10 +11,12 @@ use crate::error::Result;
 use crate::optics::media::Priority;
 
 use super::super::THRESHOLD;
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{Layers, MetalLayer, isotropic};
 use super::Dialect;
 #[cfg(test)]
 use super::inputs::Declared;
-use super::inputs::{Inputs, Integer, Number, Switch, input};
+use super::inputs::{Color, Inputs, Integer, Number, Switch, input};
 use super::layered::{self, Lobe};
 use super::vocabulary::{Glass, Response};
 
@@ -29,6 +31,12 @@ const INDEPENDENT_ROUGHNESS: Number = input("independent_transmission_roughness"
 const IOR: Number = input("refractive_index", 1.5);
 const USE_INDEPENDENT_IOR: Switch = input("use_independent_transmission_refractive_index", false);
 const INDEPENDENT_IOR: Number = input("independent_transmission_refractive_index", 1.5);
+const TRANSMISSION_COLOR: Color = input("transmission_color", [1.0; 3]);
+const ALBEDO: Color = input("albedo", [1.0; 3]);
+const DIFFUSE_ROUGHNESS: Number = input("diffuse_roughness", 0.0);
+const METALLIC_COLOR: Color = input("metallic_color", [1.0; 3]);
+const METALLIC_EDGE_COLOR: Color = input("metallic_edge_color", [1.0; 3]);
+const SPECULAR: Number = input("specular", 1.0);
 const USE_DISPERSION: Switch = input("use_dispersion", false);
 const ABBE_NUMBER: Number = input("dispersion_abbe_number", 34.0);
 const PRIORITY: Integer = input("priority", 0);
@@ -73,6 +81,27 @@ impl Dialect for DwaRefractive {
         }
         let Lobe { rough, thin_walled } = lobe(inputs, diagnostics)?;
         Ok(Response::Transmissive { why, rough, thin_walled })
+    }
+
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let (shown, white) = (p.switch(SHOW_TRANSMISSION), p.gray(1.0)?);
+        let roughness = match shown && p.switch(USE_INDEPENDENT_ROUGHNESS) {
+            true => p.number(INDEPENDENT_ROUGHNESS)?,
+            false => p.number(ROUGHNESS)?,
+        };
+        let ior = match shown && p.switch(USE_INDEPENDENT_IOR) {
+            true => p.number(INDEPENDENT_IOR)?,
+            false => p.number(IOR)?,
+        };
+        let black = p.gray(0.0)?;
+        Ok(Layers {
+            alpha: isotropic(roughness, p)?,
+            transmission: p.constant(if shown { 1.0 } else { 0.0 })?,
+            transmission_tint: p.color(TRANSMISSION_COLOR)?,
+            thin_walled: p.switch(THIN_GEOMETRY),
+            presence: p.number(PRESENCE)?,
+            ..Layers::plastic(if shown { white } else { black }, ior, p)?
+        })
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {
@@ -125,6 +154,23 @@ impl Dialect for DwaBase {
             |diagnostics| inputs.is_rough(ROUGHNESS, diagnostics),
             diagnostics,
         )
+    }
+
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let transmission = if p.switch(SHOW_TRANSMISSION) { p.number(TRANSMISSION)? } else { p.constant(0.0)? };
+        let (albedo, roughness, ior) = (p.color(ALBEDO)?, p.number(ROUGHNESS)?, p.number(IOR)?);
+        Ok(Layers {
+            diffuse_roughness: p.number(DIFFUSE_ROUGHNESS)?,
+            metalness: p.number(METALLIC)?,
+            metal: MetalLayer::Artistic { reflectivity: p.color(METALLIC_COLOR)?, edge: p.color(METALLIC_EDGE_COLOR)? },
+            specular_weight: p.number(SPECULAR)?,
+            alpha: isotropic(roughness, p)?,
+            transmission,
+            transmission_tint: p.color(TRANSMISSION_COLOR)?,
+            thin_walled: p.switch(THIN_GEOMETRY),
+            presence: p.number(PRESENCE)?,
+            ..Layers::plastic(albedo, ior, p)?
+        })
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {

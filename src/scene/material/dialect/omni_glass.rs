@@ -7,12 +7,14 @@
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{Layers, isotropic};
 use super::super::{Context, THRESHOLD};
 use super::Dialect;
 #[cfg(test)]
 use super::inputs::Declared;
-use super::inputs::{Inputs, Number, Switch, input};
-use super::layered;
+use super::inputs::{Color, Inputs, Number, Switch, input};
+use super::layered::{self, presence};
 use super::vocabulary::{Attenuation, Glass, Response};
 
 const ENABLE_OPACITY: Switch = input("enable_opacity", false);
@@ -21,6 +23,8 @@ const OPACITY_THRESHOLD: Number = input("opacity_threshold", 0.0);
 const THIN_WALLED: Switch = input("thin_walled", false);
 const ROUGHNESS: Number = input("frosting_roughness", 0.0);
 const IOR: Number = input("glass_ior", 1.491);
+const COLOR: Color = input("glass_color", [1.0; 3]);
+const REFLECTION_COLOR: Color = input("reflection_color", [1.0; 3]);
 const DEPTH: Number = input("depth", 0.001);
 
 pub(super) struct OmniGlass;
@@ -57,6 +61,21 @@ impl Dialect for OmniGlass {
             rough: inputs.is_rough(ROUGHNESS, diagnostics)?,
             // The material makes itself thin-walled where its opacity is anything but 1.
             thin_walled: inputs.switch(THIN_WALLED, diagnostics)? || opacity.value < 1.0,
+        })
+    }
+
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let opacity = p.number(OPACITY)?;
+        let presence = presence(p, ENABLE_OPACITY, OPACITY, OPACITY_THRESHOLD)?;
+        let (white, ior, roughness) = (p.gray(1.0)?, p.number(IOR)?, p.number(ROUGHNESS)?);
+        Ok(Layers {
+            alpha: isotropic(roughness, p)?,
+            transmission: p.constant(1.0)?,
+            specular_color: p.color(REFLECTION_COLOR)?,
+            transmission_tint: p.color(COLOR)?,
+            thin_walled: p.switch(THIN_WALLED) || p.b().value(opacity).is_some_and(|[opacity, ..]| opacity < 1.0),
+            presence,
+            ..Layers::plastic(white, ior, p)?
         })
     }
 

@@ -8,12 +8,14 @@
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{CoatLayer, Layers, MetalLayer, SheenLayer, isotropic, surface_tint};
 use super::super::{Context, THRESHOLD};
 use super::Dialect;
 #[cfg(test)]
 use super::inputs::Declared;
 use super::inputs::{Color, Inputs, Number, Switch, Word, input};
-use super::layered::{self, Lobe};
+use super::layered::{self, Lobe, presence};
 use super::vocabulary::{Attenuation, Glass, Response};
 
 const ENABLE_OPACITY: Switch = input("enable_opacity", false);
@@ -30,6 +32,19 @@ const ABBE_NUMBER: Number = input("specular_transmission_dispersion_abbe", 0.0);
 const COLOR: Color = input("specular_transmission_color", [1.0; 3]);
 const DEPTH: Number = input("specular_transmission_scattering_depth", 0.0);
 const SCATTER: Color = input("specular_transmission_scattering_color", [0.0; 3]);
+
+const DIFFUSE_WEIGHT: Number = input("diffuse_reflection_weight", 0.8);
+const DIFFUSE_COLOR: Color = input("diffuse_reflection_color", [1.0; 3]);
+const DIFFUSE_ROUGHNESS: Number = input("diffuse_reflection_roughness", 0.0);
+const SPECULAR_WEIGHT: Number = input("specular_reflection_weight", 1.0);
+const SPECULAR_COLOR: Color = input("specular_reflection_color", [1.0; 3]);
+const COAT_WEIGHT: Number = input("coat_weight", 0.0);
+const COAT_COLOR: Color = input("coat_color", [1.0; 3]);
+const COAT_ROUGHNESS: Number = input("coat_roughness", 0.1);
+const COAT_IOR: Number = input("coat_ior", 1.5);
+const SHEEN_WEIGHT: Number = input("specular_retro_reflection_weight", 0.0);
+const SHEEN_COLOR: Color = input("specular_retro_reflection_color", [1.0; 3]);
+const SHEEN_ROUGHNESS: Number = input("specular_retro_reflection_roughness", 0.3);
 
 /// `ior_preset_to_value`, in the order of the enumeration `ior_presets`, which begins at 0.
 const PRESETS: [(&str, f64); 27] = [
@@ -125,6 +140,48 @@ impl Dialect for OmniSurface {
             |diagnostics| inputs.is_rough(ROUGHNESS, diagnostics),
             diagnostics,
         )
+    }
+
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let (weight, color) = (p.number(DIFFUSE_WEIGHT)?, p.color(DIFFUSE_COLOR)?);
+        let base = p.multiply(color, weight)?;
+        let (specular, specular_color) = (p.number(SPECULAR_WEIGHT)?, p.color(SPECULAR_COLOR)?);
+        let names = PRESETS.map(|(name, _)| name);
+        let preset = p.word(PRESET, &names);
+        let ior = match PRESETS.iter().find(|(name, _)| *name == preset) {
+            Some((_, index)) => p.constant(*index as f32)?,
+            None => p.number(IOR)?,
+        };
+        let transmission = if p.switch(ENABLE_TRANSMISSION) { p.number(TRANSMISSION)? } else { p.constant(0.0)? };
+        let coat_roughness = p.number(COAT_ROUGHNESS)?;
+        let coat = CoatLayer {
+            weight: p.number(COAT_WEIGHT)?,
+            color: p.color(COAT_COLOR)?,
+            ior: p.number(COAT_IOR)?,
+            alpha: isotropic(coat_roughness, p)?,
+            darkening: p.constant(0.0)?,
+        };
+        let sheen = SheenLayer {
+            weight: p.number(SHEEN_WEIGHT)?,
+            color: p.color(SHEEN_COLOR)?,
+            roughness: p.number(SHEEN_ROUGHNESS)?,
+        };
+        let roughness = p.number(ROUGHNESS)?;
+        Ok(Layers {
+            diffuse_roughness: p.number(DIFFUSE_ROUGHNESS)?,
+            metalness: p.number(METALNESS)?,
+            metal: MetalLayer::Tint { f0: base, f82: specular_color },
+            specular_weight: specular,
+            specular_color,
+            alpha: isotropic(roughness, p)?,
+            transmission,
+            transmission_tint: surface_tint(COLOR, DEPTH, p)?,
+            thin_walled: p.switch(THIN_WALLED),
+            coat: Some(coat),
+            sheen: Some(sheen),
+            presence: presence(p, ENABLE_OPACITY, OPACITY, OPACITY_THRESHOLD)?,
+            ..Layers::plastic(base, ior, p)?
+        })
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {

@@ -5,12 +5,15 @@
 
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
+use crate::texture::Register;
 
 use super::super::THRESHOLD;
 use super::super::appearance::{Below, OpacityInput};
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{CoatLayer, Layers, MetalLayer, f0_of, isotropic};
 #[cfg(test)]
 use super::inputs::Declared;
-use super::inputs::{Inputs, Number, Switch, Word, input};
+use super::inputs::{Color, Inputs, Number, Switch, Word, input};
 use super::vocabulary::{Glass, Response};
 use super::{Dialect, layered};
 
@@ -21,6 +24,12 @@ const METALLIC: Number = input("metallic", 0.0);
 const USE_SPECULAR_WORKFLOW: Switch = input("useSpecularWorkflow", false);
 const ROUGHNESS: Number = input("roughness", 0.5);
 const IOR: Number = input("ior", 1.5);
+const DIFFUSE_COLOR: Color = input("diffuseColor", [0.18; 3]);
+const SPECULAR_COLOR: Color = input("specularColor", [0.0; 3]);
+const EMISSIVE_COLOR: Color = input("emissiveColor", [0.0; 3]);
+const CLEARCOAT: Number = input("clearcoat", 0.0);
+const CLEARCOAT_ROUGHNESS: Number = input("clearcoatRoughness", 0.01);
+const NORMAL: &str = "normal";
 
 pub(super) struct PreviewSurface;
 
@@ -83,8 +92,53 @@ impl Dialect for PreviewSurface {
         let below = if threshold > 0.0 || is_presence { Below::CutOut } else { Below::Glass };
         Ok(Some(OpacityInput { name: OPACITY.name, limit, below, is_color: false }))
     }
+    /// Specular workflow: F0 is the specular colour. Metallic workflow: F0 = ((1 − ior)/(1 + ior))² under white, the metal reflects its albedo at every angle.
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let (color, ior) = (p.color(DIFFUSE_COLOR)?, p.number(IOR)?);
+        let alpha = isotropic(p.number(ROUGHNESS)?, p)?;
+        let (presence, transmission) = presence_and_transmission(p)?;
+        let coat_roughness = p.number(CLEARCOAT_ROUGHNESS)?;
+        let coat = CoatLayer {
+            weight: p.number(CLEARCOAT)?,
+            color: p.gray(1.0)?,
+            ior,
+            alpha: isotropic(coat_roughness, p)?,
+            darkening: p.constant(0.0)?,
+        };
+        let layers = Layers {
+            alpha,
+            transmission,
+            presence,
+            coat: Some(coat),
+            emission: p.color(EMISSIVE_COLOR)?,
+            normal: p.network(NORMAL),
+            ..Layers::plastic(color, ior, p)?
+        };
+        if p.switch(USE_SPECULAR_WORKFLOW) {
+            return Ok(Layers { schlick_f0: Some(p.color(SPECULAR_COLOR)?), ..layers });
+        }
+        Ok(Layers {
+            schlick_f0: Some(f0_of(ior, p)?),
+            metalness: p.number(METALLIC)?,
+            metal: MetalLayer::Flat(color),
+            ..layers
+        })
+    }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {
         layered::glass(inputs, IOR, None, diagnostics)
+    }
+}
+
+/// Under a threshold nothing is there, in the mode `presence` the opacity is how much, else glass is what is not opaque.
+fn presence_and_transmission(p: &mut Painter<'_, '_, '_>) -> Painted<(Register, Register)> {
+    let (opacity, threshold) = (p.number(OPACITY)?, p.number(OPACITY_THRESHOLD)?);
+    let (zero, one) = (p.constant(0.0)?, p.constant(1.0)?);
+    if p.b().value(threshold).is_none_or(|[threshold, ..]| threshold > 0.0) {
+        return Ok((p.is_at_least(opacity, threshold)?, zero));
+    }
+    match p.word(OPACITY_MODE, &["transparent", "presence"]) {
+        "presence" => Ok((opacity, zero)),
+        _ => Ok((one, p.one_minus(opacity)?)),
     }
 }

@@ -10,6 +10,8 @@ use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
 use super::super::THRESHOLD;
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{Layers, isotropic};
 use super::Dialect;
 #[cfg(test)]
 use super::inputs::Declared;
@@ -23,6 +25,9 @@ const THIN: Switch = input("thinGlass", false);
 const ROUGHNESS: Number = input("glassRoughness", 0.1);
 const REFRACTION_ROUGHNESS: Number = input("glassRefractionRoughness", -1.0);
 const IOR: Number = input("glassIor", 1.5);
+const DIFFUSE_GAIN: Number = input("diffuseGain", 1.0);
+const DIFFUSE_COLOR: Color = input("diffuseColor", [0.18; 3]);
+const REFRACTION_COLOR: Color = input("refractionColor", [1.0; 3]);
 const EXTINCTION: Color = input("extinction", [0.0; 3]);
 
 pub(super) struct PxrSurface;
@@ -64,6 +69,22 @@ impl Dialect for PxrSurface {
         let is_separate = inputs.number(REFRACTION_ROUGHNESS, diagnostics)? >= 0.0;
         let rough = inputs.is_rough(if is_separate { REFRACTION_ROUGHNESS } else { ROUGHNESS }, diagnostics)?;
         Ok(Response::Transmissive { why: gain.to_string(), rough, thin_walled: inputs.switch(THIN, diagnostics)? })
+    }
+
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let (gain, color, ior) = (p.number(DIFFUSE_GAIN)?, p.color(DIFFUSE_COLOR)?, p.number(IOR)?);
+        let (base, transmission) = (p.multiply(color, gain)?, p.number(REFRACTION_GAIN)?);
+        let roughness = p.number(ROUGHNESS)?;
+        // The dielectric is the glass lobe's; the specular lobes are not read.
+        Ok(Layers {
+            specular_weight: transmission,
+            alpha: isotropic(roughness, p)?,
+            transmission,
+            transmission_tint: p.color(REFRACTION_COLOR)?,
+            thin_walled: p.switch(THIN),
+            presence: p.number(PRESENCE)?,
+            ..Layers::plastic(base, ior, p)?
+        })
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {

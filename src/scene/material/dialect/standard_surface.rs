@@ -7,8 +7,11 @@
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 use crate::optics::media::Priority;
+use crate::texture::{Function, Register};
 
 use super::super::appearance::OpacityInput;
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{CoatLayer, FilmLayer, Layers, MetalLayer, SheenLayer, anisotropic, surface_tint};
 use super::super::{Context, SMOOTH_ROUGHNESS};
 use super::Dialect;
 #[cfg(test)]
@@ -28,6 +31,30 @@ const ABBE_NUMBER: Number = input("transmission_dispersion", 0.0);
 const COLOR: Color = input("transmission_color", [1.0; 3]);
 const DEPTH: Number = input("transmission_depth", 0.0);
 const SCATTER: Color = input("transmission_scatter", [0.0; 3]);
+const BASE: Number = input("base", 1.0);
+const BASE_COLOR: Color = input("base_color", [0.8; 3]);
+const DIFFUSE_ROUGHNESS: Number = input("diffuse_roughness", 0.0);
+const SPECULAR: Number = input("specular", 1.0);
+const SPECULAR_COLOR: Color = input("specular_color", [1.0; 3]);
+const ANISOTROPY: Number = input("specular_anisotropy", 0.0);
+const ROTATION: Number = input("specular_rotation", 0.0);
+const SUBSURFACE: Number = input("subsurface", 0.0);
+const SUBSURFACE_COLOR: Color = input("subsurface_color", [1.0; 3]);
+const SHEEN: Number = input("sheen", 0.0);
+const SHEEN_COLOR: Color = input("sheen_color", [1.0; 3]);
+const SHEEN_ROUGHNESS: Number = input("sheen_roughness", 0.3);
+const COAT: Number = input("coat", 0.0);
+const COAT_COLOR: Color = input("coat_color", [1.0; 3]);
+const COAT_ROUGHNESS: Number = input("coat_roughness", 0.1);
+const COAT_ANISOTROPY: Number = input("coat_anisotropy", 0.0);
+const COAT_IOR: Number = input("coat_IOR", 1.5);
+const COAT_AFFECT_COLOR: Number = input("coat_affect_color", 0.0);
+const COAT_AFFECT_ROUGHNESS: Number = input("coat_affect_roughness", 0.0);
+const FILM_THICKNESS: Number = input("thin_film_thickness", 0.0);
+const FILM_IOR: Number = input("thin_film_IOR", 1.5);
+const EMISSION: Number = input("emission", 0.0);
+const EMISSION_COLOR: Color = input("emission_color", [1.0; 3]);
+const NORMAL: &str = "normal";
 const PRIORITY: Integer = input("dielectric_priority", 0);
 
 pub(super) struct StandardSurface;
@@ -76,6 +103,72 @@ impl Dialect for StandardSurface {
         Ok(layered::holes(inputs, OPACITY, true))
     }
 
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        // Version 1.0.0 has the defaults the other way round.
+        let (weight, color) = match p.id() {
+            "ND_standard_surface_surfaceshader_100" => {
+                (p.number((BASE.name, 0.8))?, p.color((BASE_COLOR.name, [1.0; 3]))?)
+            }
+            _ => (p.number(BASE)?, p.color(BASE_COLOR)?),
+        };
+        let (specular, specular_color) = (p.number(SPECULAR)?, p.color(SPECULAR_COLOR)?);
+        let (coat, coat_roughness) = (p.number(COAT)?, p.number(COAT_ROUGHNESS)?);
+        let (transmission, anisotropy) = (p.number(TRANSMISSION)?, p.number(ANISOTROPY)?);
+        let roughness = roughness(transmission, coat, coat_roughness, p)?;
+        let coat_anisotropy = p.number(COAT_ANISOTROPY)?;
+        let coat_layer = CoatLayer {
+            weight: coat,
+            color: p.color(COAT_COLOR)?,
+            ior: p.number(COAT_IOR)?,
+            alpha: anisotropic(coat_roughness, coat_anisotropy, p)?,
+            darkening: p.constant(0.0)?,
+        };
+        let (subsurface_color, subsurface) = (p.color(SUBSURFACE_COLOR)?, p.number(SUBSURFACE)?);
+        let affected = coat_gamma(coat, p)?;
+        let diffuse = saturated(color, affected, p)?;
+        let diffuse = p.multiply(diffuse, weight)?;
+        let below = saturated(subsurface_color, affected, p)?;
+        let (thin_walled, zero) = (p.switch(THIN_WALLED), p.constant(0.0)?);
+        let (diffuse, diffuse_transmission) = match thin_walled {
+            // Under a thin wall all of it comes out on the other side.
+            true => (p.mix(diffuse, zero, subsurface)?, p.multiply(below, subsurface)?),
+            false => (p.mix(diffuse, below, subsurface)?, zero),
+        };
+        let sheen = SheenLayer {
+            weight: p.number(SHEEN)?,
+            color: p.color(SHEEN_COLOR)?,
+            roughness: p.number(SHEEN_ROUGHNESS)?,
+        };
+        let film =
+            FilmLayer { weight: p.constant(1.0)?, thickness_nm: p.number(FILM_THICKNESS)?, ior: p.number(FILM_IOR)? };
+        let (emission, emission_color) = (p.number(EMISSION)?, p.color(EMISSION_COLOR)?);
+        let metal = MetalLayer::Artistic {
+            reflectivity: p.multiply(color, weight)?,
+            edge: p.multiply(specular_color, specular)?,
+        };
+        let ior = p.number(IOR)?;
+        Ok(Layers {
+            diffuse_roughness: p.number(DIFFUSE_ROUGHNESS)?,
+            metalness: p.number(METALNESS)?,
+            metal,
+            specular_weight: specular,
+            specular_color,
+            alpha: anisotropic(roughness, anisotropy, p)?,
+            transmission,
+            transmission_tint: surface_tint(COLOR, DEPTH, p)?,
+            thin_walled,
+            diffuse_transmission,
+            coat: Some(coat_layer),
+            sheen: Some(sheen),
+            film: Some(film),
+            presence: p.mean_of_color(OPACITY)?,
+            emission: p.multiply(emission_color, emission)?,
+            normal: p.network(NORMAL),
+            rotation: p.number(ROTATION)?,
+            ..Layers::plastic(diffuse, ior, p)?
+        })
+    }
+
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {
         let abbe_number = layered::abbe_number(inputs, ABBE_NUMBER, diagnostics)?;
         layered::glass(inputs, IOR, abbe_number, diagnostics)
@@ -97,4 +190,32 @@ impl Dialect for StandardSurface {
     fn priority(&self, inputs: &Inputs<'_>) -> Result<Option<(Priority, String)>> {
         layered::arnolds_priority(inputs, PRIORITY)
     }
+}
+
+/// Of the interface: what transmits has the extra roughness by its share, and a rough coat blurs what is under it.
+fn roughness(transmission: Register, coat: Register, coat_roughness: Register, p: &mut Painter<'_, '_, '_>) -> Painted {
+    let (roughness, extra) = (p.number(ROUGHNESS)?, p.number(EXTRA_ROUGHNESS)?);
+    let transmitting = p.add(roughness, extra)?;
+    let transmitting = p.clamp(transmitting, 0.0, 1.0)?;
+    let roughness = p.mix(roughness, transmitting, transmission)?;
+    let affect = p.number(COAT_AFFECT_ROUGHNESS)?;
+    let affect = p.multiply(affect, coat)?;
+    let (affect, one) = (p.multiply(affect, coat_roughness)?, p.constant(1.0)?);
+    p.mix(roughness, one, affect)
+}
+
+/// Under the coat colours are raised to this power.
+fn coat_gamma(coat: Register, p: &mut Painter<'_, '_, '_>) -> Painted {
+    let (coat, affect) = (p.clamp(coat, 0.0, 1.0)?, p.number(COAT_AFFECT_COLOR)?);
+    let (more, one) = (p.multiply(coat, affect)?, p.constant(1.0)?);
+    p.add(one, more)
+}
+
+fn saturated(color: Register, gamma: Register, p: &mut Painter<'_, '_, '_>) -> Painted {
+    if p.b().value(gamma) == Some([1.0; 4]) {
+        return Ok(color);
+    }
+    let zero = p.constant(0.0)?;
+    let color = p.b().binary(Function::Max, color, zero)?;
+    p.power(color, gamma)
 }

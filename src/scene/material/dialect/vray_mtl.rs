@@ -9,6 +9,8 @@
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
+use super::super::painter::{Painted, Painter};
+use super::super::surface::{Layers, MetalLayer, isotropic};
 use super::super::{Context, SMOOTH_ROUGHNESS};
 use super::Dialect;
 #[cfg(test)]
@@ -27,6 +29,9 @@ const USE_ROUGHNESS: Switch = input("option_use_roughness", false);
 const IOR: Number = input("refract_ior", 1.6);
 const DISPERSION_ON: Switch = input("dispersion_on", false);
 const ABBE_NUMBER: Number = input("dispersion", 50.0);
+const DIFFUSE: Color = input("diffuse", [0.5; 3]);
+const REFLECT: Color = input("reflect", [0.0; 3]);
+const REFRACT_COLOR: Color = input("refract", [0.0; 3]);
 const FOG_COLOR: Color = input("fog_color", [1.0; 3]);
 const FOG_MULT: Number = input("fog_mult", 1.0);
 const FOG_DEPTH: Number = input("fog_depth", 1.0);
@@ -80,6 +85,31 @@ impl Dialect for VRayMtl {
             |diagnostics| is_rough(inputs, REFLECT_GLOSSINESS, diagnostics),
             diagnostics,
         )
+    }
+
+    fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
+        let (diffuse, reflect, refract) = (p.color(DIFFUSE)?, p.color(REFLECT)?, p.color(REFRACT_COLOR)?);
+        let transmission = p.mean_of_color(REFRACT)?;
+        let (metalness, white) = (p.number(METALNESS)?, p.gray(1.0)?);
+        let mut roughness = p.number(REFLECT_GLOSSINESS)?;
+        if !p.switch(USE_ROUGHNESS) {
+            roughness = p.one_minus(roughness)?;
+        }
+        // The weight is a colour: its mean is the share, the rest a tint.
+        let tiny = p.constant(f32::MIN_POSITIVE)?;
+        let divisor = p.max(transmission, tiny)?;
+        let ior = p.number(IOR)?;
+        Ok(Layers {
+            metalness,
+            metal: MetalLayer::Tint { f0: diffuse, f82: white },
+            specular_color: reflect,
+            alpha: isotropic(roughness, p)?,
+            transmission,
+            transmission_tint: p.divide(refract, divisor)?,
+            thin_walled: p.switch(THIN_WALLED),
+            presence: p.mean_of_color(OPACITY)?,
+            ..Layers::plastic(diffuse, ior, p)?
+        })
     }
 
     fn glass(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Glass> {

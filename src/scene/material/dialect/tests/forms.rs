@@ -336,7 +336,7 @@ fn absorption_is_a_colour_over_a_distance_in_stage_units() {
     ];
     let found = |id: &str, values: &Value, context: &Context| {
         let shader = shader(id, values);
-        let surface = Surface::of(&shader).unwrap_or_else(|| panic!("{id} is understood"));
+        let surface = Terminal::of(&shader).unwrap_or_else(|| panic!("{id} is understood"));
         surface
             .attenuation(context, &mut Diagnostics::default())
             .unwrap_or_else(|error| panic!("{id} {values}: {error}"))
