@@ -326,6 +326,16 @@ pub struct SurfaceAt<const N: usize> {
     pub rotation: f32,
 }
 
+impl<const N: usize> SurfaceAt<N> {
+    /// Whether it matters which way its tangent points.
+    #[allow(clippy::float_cmp, reason = "isotropic materials have the same number twice")]
+    pub(in crate::scene) fn has_direction(&self) -> bool {
+        let differs = |[along, across]: [f32; 2]| along != across;
+        let Parameters { alpha, coat, .. } = &self.parameters;
+        self.normal_map.is_some() || differs(*alpha) || coat.is_some_and(|coat| differs(coat.alpha))
+    }
+}
+
 /// Sorts registers into constants and results.
 struct Compiler<'p, 'a, 'n, 'd> {
     p: &'p mut Painter<'a, 'n, 'd>,
