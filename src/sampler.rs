@@ -113,6 +113,11 @@ impl Sampler {
         PathSampler { index, seed: self.pixel_seed(pixel), group: FIRST_GROUP }
     }
 
+    /// Independent numbers for the path that sample `index` of `pixel` begins: nothing of them is stratified.
+    pub fn independent(&self, pixel: [i32; 2], index: u32) -> PathSampler {
+        PathSampler { index, seed: hash(self.pixel_seed(pixel)), group: GROUPS }
+    }
+
     fn pixel_seed(&self, pixel: [i32; 2]) -> u64 {
         hash(self.seed ^ (u64::from(pixel[0] as u32) << 32 | u64::from(pixel[1] as u32)))
     }

@@ -7,9 +7,13 @@
 pub mod chain;
 mod counters;
 pub mod differentials;
+mod frame;
+mod lanes;
 pub mod path;
+pub mod reference;
 mod screen_motion;
 mod search;
+mod surface;
 pub mod transmittance;
 mod walk;
 
@@ -58,6 +62,8 @@ pub struct Needs {
     pub transmittance: bool,
     /// Whether the colours of surfaces are looked up.
     pub albedo: bool,
+    /// Whether light is followed: lights are compiled, and all that surfaces scatter with is looked up.
+    pub transport: bool,
 }
 
 impl Needs {
@@ -82,6 +88,7 @@ impl Needs {
             retrace: is_dispersive && has(Family::Retrace),
             albedo: aovs.iter().any(|aov| is_albedo(aov)),
             transmittance: aovs.iter().any(|aov| aov.name == INTERNAL_TRANSMITTANCE),
+            transport: has(Family::Transport),
         }
     }
 }
@@ -172,7 +179,13 @@ pub struct Registry {
 impl Default for Registry {
     /// The integrators of this crate.
     fn default() -> Self {
-        Self { integrators: vec![Arc::new(differentials::Differentials), Arc::new(path::Path)] }
+        Self {
+            integrators: vec![
+                Arc::new(differentials::Differentials),
+                Arc::new(path::Path),
+                Arc::new(reference::Reference),
+            ],
+        }
     }
 }
 

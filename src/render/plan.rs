@@ -333,14 +333,21 @@ fn reasons(
             None => note(false, "∂N, how normals move", "every glass has flat facets".into()),
         }
     }
-    let unused = format!("the integrator '{}' has no use for them", integrator.name());
     let kinds: Vec<_> =
         lights::kinds(scene.document()).into_iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+    let emitting = scene.materials.iter().find(|material| material.surface.emits());
+    let why = match needs.transport {
+        true => format!("{} for light", list(&asked(&[Family::Transport]), "asks", "ask")),
+        false => format!("the integrator '{}' has no use for them, or no AOV asks for light", integrator.name()),
+    };
     if kinds.is_empty() {
-        note(false, "light sampling, emission", unused);
+        note(false, "light sampling", "the stage has no lights".into());
     } else {
-        note(false, &format!("lights ({})", kinds.join(", ")), unused.clone());
-        note(false, "emission", unused);
+        note(needs.transport, &format!("lights ({})", kinds.join(", ")), why.clone());
+    }
+    match emitting {
+        None => note(false, "emission", "no material in use emits".into()),
+        Some(material) => note(needs.transport, "emission", format!("{} emits, and {why}", material.path)),
     }
     textures::decide(scene, layers, needs, &mut note);
     if scene.objects.hides_some() {

@@ -24,6 +24,10 @@ pub(super) fn memory(request: &Request) -> Result<u64> {
 fn needed(scene: &Scene, needs: &Needs) -> Vec<u32> {
     let programs = scene.materials.iter().flat_map(|material| material.appearance.looked_up(needs.albedo));
     let mut images: Vec<u32> = programs.flat_map(|program| program.images()).collect();
+    if needs.transport {
+        let bundles = scene.materials.iter().filter_map(|material| material.surface.looked_up());
+        images.extend(bundles.flat_map(|bundle| bundle.images()));
+    }
     images.sort_unstable();
     images.dedup();
     images

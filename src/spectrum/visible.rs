@@ -196,6 +196,12 @@ pub fn sample<const N: usize>(u: f64) -> Wavelengths<N> {
     EYE.sample(u)
 }
 
+/// One wavelength, evenly from 360–830 nm, for the place `u` in 0..1: what `reference` uses.
+pub fn uniform(u: f64) -> Wavelengths<1> {
+    let (first, last) = (SHORTEST.nanometers(), LONGEST.nanometers());
+    Wavelengths { nanometers: [first + u * (last - first)], pdf_lambda: [(1.0 / (last - first)) as f32] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

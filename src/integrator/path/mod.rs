@@ -7,13 +7,11 @@
 
 use std::ops::Range;
 
-mod frame;
-mod media;
-mod surface;
 mod tracer;
 
 use super::chain::{Counters, Follower};
 use super::differentials::{self, Differentials};
+use super::lanes::Laws;
 use super::{Integrator, PreparedIntegrator, Task, Worker};
 use crate::error::Result;
 use crate::film::aov::{AOVS, Aov, Family};
@@ -22,7 +20,6 @@ use crate::lighting::Lighting;
 use crate::spectrum::sensor;
 use crate::spectrum::{LANES, visible};
 use glam::{DMat3, DVec3};
-use media::Laws;
 use tracer::Tracer;
 
 /// The integrator; it has no settings of its own.

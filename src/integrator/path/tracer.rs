@@ -8,12 +8,12 @@
 
 use glam::{DVec3, Vec3};
 
-use super::frame::Frame;
-use super::media::{Laws, PathMedia};
-use super::surface;
 use crate::bsdf::{Bsdf, Interface, Scattered};
 use crate::geometry::Ray;
 use crate::integrator::chain::{Counters, Follower};
+use crate::integrator::frame::Frame;
+use crate::integrator::lanes::{Laws, PathMedia};
+use crate::integrator::surface;
 use crate::integrator::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
 use crate::light::Light;
 use crate::lighting::{LightHit, LightSample, Lighting, Receiver};
@@ -284,7 +284,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 ((scattering.momentum_out / ior).normalize(), passes)
             }
             Scattered::Straight => {
-                // No vertex: light that was sampled comes through as well.
+                state.vertex = None;
                 walk.cross(met);
                 return self.survives(state, *vertices, u_roulette);
             }
@@ -388,7 +388,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             if set.is_some_and(|set| !view.scene.is_linked(set, hit.instance)) {
                 return false;
             }
-            match surface::through(view, hit, wavelengths, numbers) {
+            match surface::through::<N>(view, hit, numbers) {
                 None => false,
                 Some(part) if part.is_black() => {
                     nearest = nearest.min(hit.distance);

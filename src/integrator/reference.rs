@@ -1,0 +1,213 @@
+//! `reference`: the slow truth that judges the other integrators.
+//!
+//! One wavelength a path, drawn uniformly from 360–830 nm; where the path goes, the BSDF alone decides; light counts where the path
+//! happens to meet it. No companions, no stratification, no multiple importance sampling, no columns. Light that no path can
+//! meet (parallel light, points, lines) is the one exception: it is sampled. Of `path` it shares what is not an estimator: rays and
+//! media, surfaces, one sample of a BSDF, what lights emit.
+
+use std::ops::Range;
+
+use glam::{DMat3, DVec3};
+
+use super::chain::{Counters, Follower};
+use super::frame::Frame;
+use super::lanes::{Laws, PathMedia};
+use super::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
+use super::{Integrator, PreparedIntegrator, Task, Worker, surface};
+use crate::bsdf::{Bsdf, Interface, Scattered};
+use crate::error::Result;
+use crate::film::aov::{AOVS, Aov, COLOR, SAMPLE_COUNT, VARIANCE};
+use crate::film::pixel::PixelAccumulator;
+use crate::geometry::Ray;
+use crate::lighting::{Lighting, Receiver};
+use crate::ray::{ScatterKind, mirror, refract_or_reflect};
+use crate::sampler::PathSampler;
+use crate::spectrum::{SampledSpectrum, Wavelengths, sensor, visible};
+
+/// From this vertex on roulette may end a path.
+const ROULETTE_FROM: u32 = 8;
+
+/// The integrator; it has no settings of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Reference;
+
+impl Integrator for Reference {
+    fn name(&self) -> &str {
+        "reference"
+    }
+
+    fn summary(&self) -> &str {
+        "the slow truth: one wavelength a path, brute force; judges the other integrators"
+    }
+
+    fn aovs(&self) -> Vec<&'static Aov> {
+        AOVS.iter().filter(|aov| matches!(aov.name, COLOR | VARIANCE | SAMPLE_COUNT)).collect()
+    }
+
+    fn prepare<'a>(&self, task: &'a Task<'a>) -> Result<Box<dyn PreparedIntegrator + 'a>> {
+        Ok(Box::new(Prepared {
+            task,
+            follower: Follower::of_camera(task.view, task.camera),
+            lighting: Lighting::new(task.view)?,
+            laws: Laws::new(task.view.scene, task.optics.dispersion_scale)?,
+        }))
+    }
+}
+
+struct Prepared<'a> {
+    task: &'a Task<'a>,
+    follower: Follower<'a>,
+    lighting: Lighting<'a>,
+    laws: Laws<'a>,
+}
+
+impl PreparedIntegrator for Prepared<'_> {
+    fn worker(&self) -> Box<dyn Worker + '_> {
+        Box::new(BruteForce {
+            prepared: self,
+            media: PathMedia::new(&self.laws, visible::uniform(0.5)),
+            color_from_xyz: self.task.color_space.from_xyz(),
+            counters: Counters::default(),
+        })
+    }
+}
+
+struct BruteForce<'a> {
+    prepared: &'a Prepared<'a>,
+    media: PathMedia<'a, 1>,
+    color_from_xyz: DMat3,
+    counters: Counters,
+}
+
+impl Worker for BruteForce<'_> {
+    fn render(&mut self, pixel: [i32; 2], range: Range<u32>, out: &mut PixelAccumulator) {
+        let task = self.prepared.task;
+        for index in range {
+            let ray = task.camera.ray(&task.sampler.sample(pixel, index));
+            let mut numbers = task.sampler.independent(pixel, index);
+            let [u, ..] = numbers.next();
+            let wavelengths = visible::uniform(u.into());
+            self.media.restart(wavelengths);
+            let mut walk = Walk::new(&self.prepared.follower, &ray);
+            let (radiance, alpha) = self.follow(&mut walk, &wavelengths, &mut numbers);
+            let DVec3 { x, y, z } = self.color_from_xyz * sensor::xyz(SampledSpectrum([radiance]), &wavelengths);
+            out.add_color([x, y, z, alpha]);
+        }
+    }
+
+    fn counters(&self) -> Counters {
+        self.counters
+    }
+}
+
+impl<'a> BruteForce<'a> {
+    /// Radiance per nm along the walk, and whether there is a surface.
+    fn follow(&mut self, walk: &mut Walk<'a>, wavelengths: &Wavelengths<1>, numbers: &mut PathSampler) -> (f32, f64) {
+        let Prepared { task, lighting, .. } = self.prepared;
+        let (mut radiance, mut throughput, mut vertices) = (0.0, 1.0, 0);
+        loop {
+            let met = walk.advance(&mut self.counters);
+            let ray = walk.ray;
+            let medium = self.media.of(walk.media.current());
+            let through = |distance: f64| medium.transmittance(distance).map_or(1.0, |t| t.hero());
+            let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
+            if let Some(light) = lighting.intersect(&ray, limit, wavelengths) {
+                radiance += throughput * through(light.distance) * light.radiance.hero();
+            }
+            let alpha = f64::from(u8::from(vertices > 0));
+            let Some(met) = met else {
+                lighting.environment(&ray, wavelengths, &mut |light| {
+                    radiance += throughput * through(f64::INFINITY) * light.radiance.hero();
+                });
+                return (radiance, alpha);
+            };
+            throughput *= through(limit);
+            let met = walk.in_contact(met, &mut self.counters);
+            let inside = task.view.inside(&met.hit, met.material_id);
+            let mut far = inside.map(|_| walk.far_side(&met, &mut self.counters));
+            let far_medium = far.as_ref().map_or(medium, |far| self.media.of(far.medium));
+            let interface = Interface { ior_i: medium.iors, ior_t: far_medium.iors };
+            let at = surface::at(task.view, &ray, &met, wavelengths, interface);
+            let [u_there, u_light, u_x, u_y] = numbers.next();
+            if walk.crossings > MAX_CROSSINGS {
+                return (radiance, alpha);
+            }
+            if u_there >= at.presence {
+                walk.cross(&met);
+                continue;
+            }
+            if let Some(far) = far.take_if(|far| far.medium == walk.media.current()) {
+                walk.pass(&met, far);
+                continue;
+            }
+            vertices += 1;
+            if let Some(light) = lighting.emitted(&ray, &met.hit, wavelengths) {
+                radiance += throughput * light.radiance.hero();
+            }
+            let facing = |n: DVec3| if ray.direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
+            let n_g = facing(met.surface.n_g);
+            let n_s = Some(facing(at.normal)).filter(|n| ray.direction.dot(*n) < 0.0).unwrap_or(n_g);
+            let frame = at.tangent.map_or_else(|| Frame::about(n_s), |tangent| Frame::along(n_s, tangent));
+            let wo = frame.to_local(-ray.direction);
+            let bsdf = Bsdf::new(&at.parameters);
+            let receiver = Receiver { point: met.point, normal: None, object: met.hit.instance, time: ray.time };
+            if let Some(light) = lighting.sample(&receiver, wavelengths, u_light, [u_x, u_y])
+                && light.is_delta
+            {
+                let wi = frame.to_local(light.wi);
+                let f = bsdf.evaluate(wo, wi);
+                let value = (f.diffuse + f.glossy).hero() * light.radiance.hero() / light.pdf;
+                let lit = (wi.z > 0.0) == (light.wi.dot(n_g) > 0.0);
+                if lit && value > 0.0 && self.sees(walk, &met, light.wi, light.distance) {
+                    radiance += throughput * value;
+                }
+            }
+            let [u_lobe, u, v, u_roulette] = numbers.next();
+            let Some(sample) = bsdf.sample(wo, u_lobe, [u, v]) else { return (radiance, 1.0) };
+            throughput *= sample.weight.hero();
+            let (direction, passes) = match sample.scattered {
+                Scattered::Toward(wi) => {
+                    let direction = frame.to_world(wi);
+                    let passes = direction.dot(n_g) < 0.0;
+                    if passes != (wi.z < 0.0) {
+                        return (radiance, 1.0);
+                    }
+                    (direction, passes)
+                }
+                Scattered::Mirror => {
+                    let jet = medium.jet();
+                    (mirror(jet.ior * ray.direction, &met.surface, &jet).momentum_out.normalize(), false)
+                }
+                Scattered::Refract => {
+                    let (ior_i, ior_t) = (medium.jet(), far_medium.jet());
+                    let scattering = refract_or_reflect(ior_i.ior * ray.direction, &met.surface, &ior_i, &ior_t);
+                    (scattering.momentum_out.normalize(), scattering.kind == ScatterKind::Refraction)
+                }
+                Scattered::Straight => (ray.direction, true),
+            };
+            if vertices >= ROULETTE_FROM {
+                let probability = throughput.min(0.95);
+                if u_roulette >= probability {
+                    return (radiance, 1.0);
+                }
+                throughput /= probability;
+            }
+            match (passes, far) {
+                (true, Some(far)) => walk.pass(&met, far),
+                (true, None) => walk.cross(&met),
+                (false, _) => {}
+            }
+            walk.turn(&met, direction, passes);
+        }
+    }
+
+    /// Whether nothing at all is in the way.
+    fn sees(&self, walk: &Walk<'_>, met: &SurfacePoint, direction: DVec3, distance: f64) -> bool {
+        let mut departures = walk.departures;
+        departures.depart(&walk.ray, &met.hit, direction.dot(met.surface.n_g) > 0.0);
+        let view = self.prepared.task.view;
+        let ray = Ray { origin: met.point, direction, ..walk.ray };
+        let nearest = view.intersect(&ray, &departures);
+        nearest.is_none_or(|hit| hit.distance >= distance * (1.0 - 1e-9))
+    }
+}
