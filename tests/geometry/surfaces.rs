@@ -178,11 +178,8 @@ fn normals_of_the_facets_are_dropped() {
 fn tangents_are_the_derivatives_of_the_point_by_the_texture_coordinates() {
     let points = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.3], [0.2, 1.2, -0.4], [1.4, 1.1, 0.6]];
     let with_uv = |uv: &[f32]| {
-        let view = PrimvarView {
-            values: Buffer::from_vec(uv.to_vec()),
-            indices: None,
-            interpolation: Interpolation::Vertex,
-        };
+        let view =
+            PrimvarView { values: Buffer::from_vec(uv.to_vec()), indices: None, interpolation: Interpolation::Vertex };
         let polygons =
             abbe::geometry::PolygonMesh { uv: Some(view), ..polygons(&points, &[3, 3], &[0, 1, 2, 1, 3, 2]) };
         let mesh = Mesh::from_polygons(&polygons).expect("a mesh").0;
