@@ -216,6 +216,12 @@ impl Aggregate {
         Some(self.extent_of(instance)?.bounds)
     }
 
+    /// Whether an instance stands where it is and as it is at all times.
+    pub(crate) fn stands_still(&self, instance: u32) -> bool {
+        let deforms = matches!(self.shape(instance), Shape::Mesh(mesh) if mesh.is_deforming());
+        !deforms && !self.is_instance_moving(instance)
+    }
+
     fn is_instance_moving(&self, instance: u32) -> bool {
         match self.numbering.locate(instance) {
             Location::Single(i) => matches!(self.singles[i].1, Standing::Moving(_)),

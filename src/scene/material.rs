@@ -31,7 +31,7 @@ use dialect::{Glass, Response, Terminal};
 use law::{Authored, StatedAbsorption};
 use network::Networks;
 use painter::Painter;
-pub(in crate::scene) use resources::Resources;
+pub(in crate::scene) use resources::{Resources, source};
 pub use shading_frame::ShadingFrame;
 use surface::IndexOf;
 pub use surface::{Surface, SurfaceAt};

@@ -155,6 +155,13 @@ impl<'a> View<'a> {
         [r, g, b].map(f64::from)
     }
 
+    /// What the material `id` of the surface at `hit` emits: linear Rec. 709 by luminance; `None` where it has no emission.
+    pub fn emission(&self, hit: &Hit, id: u32) -> Option<[f64; 3]> {
+        let program = self.scene.materials[id.checked_sub(1)? as usize].appearance.emission.as_ref()?;
+        let [r, g, b, _] = self.evaluate(program, hit);
+        Some([r, g, b].map(|x| if x > 0.0 && x.is_finite() { f64::from(x) } else { 0.0 }))
+    }
+
     /// Whether the surface at `hit`, whose material is `id`, is as its material says, something else, or not there.
     pub fn presence(&self, hit: &Hit, id: u32) -> Presence {
         let Some(index) = id.checked_sub(1) else { return Presence::AsStated };
