@@ -152,6 +152,12 @@ pub const COLOR: &str = "color";
 pub const VARIANCE: &str = "variance";
 /// Samples that a pixel got.
 pub const SAMPLE_COUNT: &str = "sample_count";
+/// Spectral bins.
+pub const SPECTRAL: &str = "spectral";
+/// The part of the beauty that comes from a group of lights.
+pub const LIGHT_GROUP: &str = "light_group";
+/// The part of the beauty whose light paths an expression describes.
+pub const LPE: &str = "lpe";
 /// What colours of light are measured in.
 const RADIANCE: &str = "radiance";
 
@@ -162,6 +168,21 @@ pub const INTERNAL_TRANSMITTANCE: &str = "internal_transmittance";
 pub const MOTION: &str = "motion";
 /// Motion on screen of what is seen through glass, which is traced again at the frame and at the next one.
 pub const REFRACTED_MOTION: &str = "refracted_motion";
+
+/// Whether an AOV is a part of the beauty.
+pub fn is_part(aov: &Aov) -> bool {
+    matches!(aov.name, "diffuse" | "reflection" | "transmission" | "emission" | LIGHT_GROUP | LPE)
+}
+
+/// What an AOV has to be told with its name (`NAME:ARGUMENT`), in words; `None` if nothing.
+pub fn argument(aov: &Aov) -> Option<&'static str> {
+    match aov.name {
+        SPECTRAL => Some("LO:HI:WIDTH in nm, such as 400:700:10"),
+        LIGHT_GROUP => Some("the name of a light group"),
+        LPE => Some("a light path expression"),
+        _ => None,
+    }
+}
 
 /// Whether an AOV is that of a surface's color.
 pub fn is_albedo(aov: &Aov) -> bool {
@@ -191,6 +212,23 @@ pub static AOVS: &[Aov] = &[
         merge: Merge::Count,
         ..light(SAMPLE_COUNT, I, "count", "samples that the pixel got")
     },
+    light(
+        SPECTRAL,
+        &["w550"],
+        "radiance/nm",
+        "mean radiance per nm in bins of the band, one channel each, called by the middle of its bin in nm",
+    ),
+    light("diffuse", RGB, RADIANCE, "the part of color whose light the first surface scatters diffusely"),
+    light("reflection", RGB, RADIANCE, "the part of color that the first surface reflects, not diffusely"),
+    light("transmission", RGB, RADIANCE, "the part of color that the first surface transmits, not diffusely"),
+    light(
+        "emission",
+        RGB,
+        RADIANCE,
+        "the part of color that is seen directly: what surfaces, lights and the background emit",
+    ),
+    light(LIGHT_GROUP, RGB, RADIANCE, "the part of color that comes from the lights of a group"),
+    light(LPE, RGB, RADIANCE, "the part of color whose light paths match an expression"),
     mean(
         "ddirection_dlambda",
         XYZ,

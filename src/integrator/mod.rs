@@ -122,6 +122,8 @@ pub struct Task<'a> {
     pub camera: &'a Camera,
     /// One AOV per layer, in the film's order.
     pub aovs: &'a [&'static Aov],
+    /// What each AOV is told with its name, as [`argument`](crate::film::aov::argument) says; empty for most.
+    pub arguments: &'a [String],
     /// What the layers need.
     pub needs: Needs,
     /// Wavelengths.

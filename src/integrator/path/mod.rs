@@ -14,7 +14,7 @@ use super::differentials::{self, Differentials};
 use super::lanes::Laws;
 use super::{Integrator, PreparedIntegrator, Task, Worker};
 use crate::error::Result;
-use crate::film::aov::{AOVS, Aov, Family};
+use crate::film::aov::{AOVS, Aov, Family, is_part};
 use crate::film::pixel::PixelAccumulator;
 use crate::lighting::Lighting;
 use crate::spectrum::sensor;
@@ -36,7 +36,7 @@ impl Integrator for Path {
     }
 
     fn aovs(&self) -> Vec<&'static Aov> {
-        AOVS.iter().collect()
+        AOVS.iter().filter(|aov| !is_part(aov)).collect()
     }
 
     fn transports_light(&self) -> bool {
@@ -111,7 +111,8 @@ impl<const N: usize, const DISPERSIVE: bool> Worker for PathWorker<'_, N, DISPER
             let wavelengths = visible::sample::<N>(numbers.wavelength());
             let seen = self.tracer.trace(&task.camera.ray(&place), wavelengths, &mut numbers);
             let DVec3 { x, y, z } = self.color_from_xyz * sensor::xyz(seen.radiance, &wavelengths);
-            out.add_color([x, y, z, f64::from(seen.alpha)]);
+            let scale = out.add_color([x, y, z, f64::from(seen.alpha)]);
+            out.add_spectrum(seen.radiance, &wavelengths, scale);
         }
     }
 
