@@ -192,7 +192,10 @@ impl<'a> View<'a> {
         interface: Interface<N>,
     ) -> SurfaceAt<N> {
         let surface = self.surface_of(id);
-        surface.at(&self.looked_up(surface, hit), wavelengths, interface)
+        match self.looked_up(surface, hit) {
+            Some(results) => surface.at(&results, wavelengths, interface),
+            None => surface.at(&[], wavelengths, interface),
+        }
     }
 
     /// The frame of what [`surface`](Self::surface) said of `hit`, met at `time`: its normal after the normal map, on the side of
@@ -212,7 +215,10 @@ impl<'a> View<'a> {
     /// [`SurfaceAt::presence`], for rays that only ask what is in their way.
     pub fn share_present(&self, hit: &Hit, id: u32) -> f32 {
         let surface = self.surface_of(id);
-        if surface.is_present() { 1.0 } else { surface.presence(&self.looked_up(surface, hit)) }
+        if surface.is_present() {
+            return 1.0;
+        }
+        self.looked_up(surface, hit).map_or_else(|| surface.presence(&[]), |results| surface.presence(&results))
     }
 
     fn surface_of(&self, id: u32) -> &'a Surface {
@@ -222,9 +228,9 @@ impl<'a> View<'a> {
         }
     }
 
-    fn looked_up(&self, surface: &Surface, hit: &Hit) -> [[f32; 4]; MAX_RESULTS] {
-        let programs = surface.looked_up();
-        programs.map_or([[0.0; 4]; MAX_RESULTS], |programs| programs.at(&self.scene.textures, self.primvars(hit)))
+    /// What the programs of a surface find at `hit`; `None` where everything is constant.
+    fn looked_up(&self, surface: &Surface, hit: &Hit) -> Option<[[f32; 4]; MAX_RESULTS]> {
+        Some(surface.looked_up()?.at(&self.scene.textures, self.primvars(hit)))
     }
 
     fn evaluate(&self, program: &Program, hit: &Hit) -> [f32; 4] {
@@ -322,3 +328,6 @@ impl Media {
         self.of(material_id.checked_sub(1).map(MediumId))
     }
 }
+
+#[cfg(test)]
+mod tests;

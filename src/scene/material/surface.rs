@@ -9,7 +9,7 @@ use crate::optics::Dispersion;
 use crate::scene::description::Shader;
 use crate::spectrum::reflectance::Reflectance;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
-use crate::texture::{Bundle, MAX_RESULTS, Register};
+use crate::texture::{Bundle, Register};
 
 use super::Conductor;
 use super::appearance::UNSTATED;
@@ -189,7 +189,7 @@ enum Source<T> {
     LookedUp(usize),
 }
 
-type Results = [[f32; 4]; MAX_RESULTS];
+type Results = [[f32; 4]];
 
 impl Number {
     fn at(&self, results: &Results) -> f32 {
@@ -219,6 +219,7 @@ enum Tint {
 }
 
 impl Tint {
+    /// Of a constant.
     fn of([r, g, b, _]: [f32; 4]) -> Self {
         let rgb = [r, g, b].map(|x| within(x, 0.0, 1.0));
         if rgb.iter().all(|&x| x >= 1.0) {
@@ -226,7 +227,7 @@ impl Tint {
         } else if rgb.iter().all(|&x| x <= 0.0) {
             Self::Black
         } else {
-            Self::Reflectance(Reflectance::of_color(rgb))
+            Self::Reflectance(Reflectance::exact(rgb.map(f64::from)))
         }
     }
 
@@ -235,7 +236,10 @@ impl Tint {
             Self::Black => SampledSpectrum::ZERO,
             Self::White => SampledSpectrum::ONE,
             Self::Reflectance(reflectance) => reflectance.at(wavelengths),
-            Self::LookedUp(i) => Self::of(results[*i]).at(results, wavelengths),
+            Self::LookedUp(i) => {
+                let [r, g, b, _] = results[*i];
+                Reflectance::of_color([r, g, b]).at(wavelengths)
+            }
         }
     }
 }
