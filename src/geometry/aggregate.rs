@@ -331,6 +331,12 @@ impl Aggregate {
         }
     }
 
+    /// How the point moves with each texture coordinate at a hit of a ray at `time`: ∂p/∂u and ∂p/∂v; `None` where none are
+    /// authored, or where they are the same all over the triangle.
+    pub fn tangents(&self, hit: &Hit, time: f64) -> Option<[DVec3; 2]> {
+        self.with(hit.instance, time, |placed| placed.tangents(hit)).expect("it was met at this time")
+    }
+
     /// The primvar with a number at a hit; `None` where the shape has none (always, for analytic shapes).
     pub fn primvar(&self, hit: &Hit, number: usize) -> Option<[f32; 4]> {
         match self.shape(hit.instance) {

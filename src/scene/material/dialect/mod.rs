@@ -50,6 +50,10 @@ trait Dialect: Sync {
     #[cfg(test)]
     fn inputs(&self) -> &'static [Declared];
 
+    /// Every other input that light transport reads.
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared];
+
     /// What the surface does to light.
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response>;
 

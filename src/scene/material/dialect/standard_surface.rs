@@ -82,6 +82,35 @@ impl Dialect for StandardSurface {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[
+            Declared::Number(BASE),
+            Declared::Color(BASE_COLOR),
+            Declared::Number(DIFFUSE_ROUGHNESS),
+            Declared::Number(SPECULAR),
+            Declared::Color(SPECULAR_COLOR),
+            Declared::Number(ANISOTROPY),
+            Declared::Number(ROTATION),
+            Declared::Number(SUBSURFACE),
+            Declared::Color(SUBSURFACE_COLOR),
+            Declared::Number(SHEEN),
+            Declared::Color(SHEEN_COLOR),
+            Declared::Number(SHEEN_ROUGHNESS),
+            Declared::Number(COAT),
+            Declared::Color(COAT_COLOR),
+            Declared::Number(COAT_ROUGHNESS),
+            Declared::Number(COAT_ANISOTROPY),
+            Declared::Number(COAT_IOR),
+            Declared::Number(COAT_AFFECT_COLOR),
+            Declared::Number(COAT_AFFECT_ROUGHNESS),
+            Declared::Number(FILM_THICKNESS),
+            Declared::Number(FILM_IOR),
+            Declared::Number(EMISSION),
+            Declared::Color(EMISSION_COLOR),
+        ]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         if let Some(why) = inputs.cut_out(OPACITY, diagnostics)? {
             return Ok(Response::CutOut(why));
@@ -146,6 +175,9 @@ impl Dialect for StandardSurface {
             reflectivity: p.multiply(color, weight)?,
             edge: p.multiply(specular_color, specular)?,
         };
+        // MaterialX' `rotate3d` turns clockwise.
+        let (turns, minus) = (p.number(ROTATION)?, p.constant(-1.0)?);
+        let rotation = p.multiply(turns, minus)?;
         let ior = p.number(IOR)?;
         Ok(Layers {
             diffuse_roughness: p.number(DIFFUSE_ROUGHNESS)?,
@@ -164,7 +196,7 @@ impl Dialect for StandardSurface {
             presence: p.mean_of_color(OPACITY)?,
             emission: p.multiply(emission_color, emission)?,
             normal: p.network(NORMAL),
-            rotation: p.number(ROTATION)?,
+            rotation,
             ..Layers::plastic(diffuse, ior, p)?
         })
     }
