@@ -156,10 +156,9 @@ impl<'a> View<'a> {
     }
 
     /// What the material `id` of the surface at `hit` emits: linear Rec. 709 by luminance; `None` where it has no emission.
-    pub fn emission(&self, hit: &Hit, id: u32) -> Option<[f64; 3]> {
-        let program = self.scene.materials[id.checked_sub(1)? as usize].appearance.emission.as_ref()?;
-        let [r, g, b, _] = self.evaluate(program, hit);
-        Some([r, g, b].map(|x| if x > 0.0 && x.is_finite() { f64::from(x) } else { 0.0 }))
+    pub fn emission(&self, hit: &Hit, id: u32) -> Option<[f32; 3]> {
+        let surface = self.surface_of(id);
+        surface.emits().then(|| surface.emission(&self.looked_up(surface, hit)))
     }
 
     /// Whether the surface at `hit`, whose material is `id`, is as its material says, something else, or not there.

@@ -501,6 +501,23 @@ impl Surface {
         self.emission != Emission::None
     }
 
+    /// What it emits where that is the same all over: linear Rec. 709 in the shader's own unit.
+    pub fn constant_emission(&self) -> Option<[f32; 3]> {
+        match self.emission {
+            Emission::Of(Source::Constant(rgb)) => Some(rgb),
+            _ => None,
+        }
+    }
+
+    /// What it emits where its programs have these results.
+    pub(in crate::scene) fn emission(&self, results: &Results) -> [f32; 3] {
+        match self.emission {
+            Emission::None => [0.0; 3],
+            Emission::Of(Source::Constant(rgb)) => rgb,
+            Emission::Of(Source::LookedUp(i)) => std::array::from_fn(|k| within(results[i][k], 0.0, f32::MAX)),
+        }
+    }
+
     /// At a hit. `results` are those of [`looked_up`](Self::looked_up) there, `interface` the media on the sides.
     pub(in crate::scene) fn at<const N: usize>(
         &self,
@@ -544,11 +561,7 @@ impl Surface {
             diffuse_transmission: tint(&self.diffuse_transmission),
             schlick_f0: self.schlick_f0.as_ref().map(tint),
         };
-        let emission = match self.emission {
-            Emission::None => [0.0; 3],
-            Emission::Of(Source::Constant(rgb)) => rgb,
-            Emission::Of(Source::LookedUp(i)) => std::array::from_fn(|k| within(results[i][k], 0.0, f32::MAX)),
-        };
+        let emission = self.emission(results);
         let normal_map = self.normal.map(|normal| match normal {
             Source::Constant(normal) => normal,
             Source::LookedUp(i) => [results[i][0], results[i][1], results[i][2]],
