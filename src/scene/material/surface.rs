@@ -446,8 +446,12 @@ impl Surface {
             None => Emission::Of(Source::LookedUp(c.result(layers.emission))),
         };
         let transmission = c.share(layers.transmission);
-        // Without an inside, light that passes goes straight on.
-        let thin_walled = layers.thin_walled || (!matches!(index, IndexOf::Media) && !transmission.is_zero());
+        let diffuse_transmission = c.tint(layers.diffuse_transmission);
+        // Without an inside, light that passes goes straight on; where none passes, there is no wall.
+        let thin_walled = match transmission.is_zero() {
+            true => layers.thin_walled && diffuse_transmission != Tint::Black,
+            false => layers.thin_walled || !matches!(index, IndexOf::Media),
+        };
         let index = match index {
             IndexOf::Media => Index::Media,
             IndexOf::Wall(dispersion) => Index::Wall(dispersion.clone()),
@@ -463,7 +467,7 @@ impl Surface {
             specular_color: c.tint(specular_color),
             alpha: layers.alpha.map(|alpha| c.share(alpha)),
             schlick_f0: layers.schlick_f0.map(|f0| c.tint(f0)),
-            diffuse_transmission: c.tint(layers.diffuse_transmission),
+            diffuse_transmission,
             index,
             transmission,
             transmission_tint: if transmission.is_zero() { Tint::White } else { c.tint(layers.transmission_tint) },
