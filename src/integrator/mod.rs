@@ -9,6 +9,7 @@ mod counters;
 pub mod differentials;
 mod frame;
 mod lanes;
+pub mod light_path;
 pub mod path;
 pub mod reference;
 mod screen_motion;
