@@ -7,11 +7,25 @@
 //! Smooth interfaces (delta lobes) only say what happens, with what probability and weight: where a mirrored or refracted ray goes
 //! is the calculus' business ([`crate::ray`], f64).
 
+mod albedo;
+mod coat;
+mod conductor;
+mod dielectric;
+mod diffuse;
+mod film;
+mod fresnel;
+mod gloss;
+mod microfacet;
 mod parameters;
+mod sheen;
+mod stack;
 
 use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
 
 use crate::spectrum::SampledSpectrum;
+use diffuse::{Diffuse, sample_cosine};
+use stack::Stack;
 
 pub use parameters::{Coat, Film, Interface, Metal, Parameters, SMOOTH_ALPHA, Sheen};
 
@@ -54,6 +68,9 @@ pub struct BsdfSample<const N: usize> {
     pub event: Event,
     /// f |cos θ| / pdf, the pdf being the hero's; for smooth lobes weight over probability.
     pub weight: SampledSpectrum<N>,
+    /// The part of `weight` that diffuse lobes have; the rest is of rough interfaces. 0 for smooth lobes. A direction is drawn from
+    /// one lobe (`event`) but weighed by all of them: parts of the beauty are exact if they are split by this.
+    pub diffuse: SampledSpectrum<N>,
     /// Density per solid angle with which each lane, were it the hero, would have drawn the direction; of smooth lobes the
     /// probability of the branch. Equal in all lanes unless a rough interface disperses.
     pub pdf: SampledSpectrum<N>,
@@ -70,47 +87,103 @@ pub struct Evaluated<const N: usize> {
     pub pdf: SampledSpectrum<N>,
 }
 
+impl<const N: usize> Evaluated<N> {
+    /// No light goes this way.
+    pub const NOTHING: Self =
+        Self { diffuse: SampledSpectrum::ZERO, glossy: SampledSpectrum::ZERO, pdf: SampledSpectrum::ZERO };
+
+    /// f |cos θ_i|.
+    #[inline]
+    pub fn value(&self) -> SampledSpectrum<N> {
+        self.diffuse + self.glossy
+    }
+}
+
+/// A function of the cosine to the normal, at every wavelength ([`albedo`]).
+type Slices<const N: usize> = [SampledSpectrum<N>; albedo::NODES];
+
 /// A BSDF at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<const N: usize> {
-    parameters: Parameters<N>,
+    kind: Kind<N>,
+}
+
+/// The common surfaces have a short way.
+#[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant, reason = "lives on the stack of one path vertex; a box would allocate per hit")]
+enum Kind<const N: usize> {
+    /// Nothing but diffuse reflection.
+    Diffuse(Diffuse<N>),
+    /// Anything.
+    Stack(Stack<N>),
 }
 
 impl<const N: usize> Bsdf<N> {
     /// Of what the surface is made of there.
     pub fn new(parameters: &Parameters<N>) -> Self {
-        Self { parameters: *parameters }
+        let bare = parameters.specular_weight <= 0.0
+            && parameters.metalness <= 0.0
+            && parameters.transmission <= 0.0
+            && parameters.coat.is_none()
+            && parameters.sheen.is_none()
+            && parameters.diffuse_transmission.is_black();
+        let kind = if bare {
+            Kind::Diffuse(Diffuse::new(parameters.base_color, parameters.diffuse_roughness))
+        } else {
+            Kind::Stack(Stack::new(parameters))
+        };
+        Self { kind }
     }
 
     /// Whether every lobe is smooth: then light sampling has nothing to add.
     pub fn is_smooth(&self) -> bool {
-        false
+        match &self.kind {
+            Kind::Diffuse(_) => false,
+            Kind::Stack(stack) => stack.is_smooth(),
+        }
     }
 
-    /// Draws a direction; `None` where the light is absorbed. `u_lobe` chooses the lobe, `u` the direction.
-    pub fn sample(&self, wo: Vec3, _u_lobe: f32, [u, v]: [f32; 2]) -> Option<BsdfSample<N>> {
+    /// Draws a direction; `None` where the light is absorbed, or `wo` is not above the surface. `u_lobe` chooses the lobe, `u` the
+    /// direction.
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample<N>> {
         if wo.z <= 0.0 {
             return None;
         }
-        let r = u.sqrt();
-        let phi = 2.0 * std::f32::consts::PI * v;
-        let wi = Vec3::new(r * libm::cosf(phi), r * libm::sinf(phi), (1.0 - u).max(0.0).sqrt());
-        let pdf = wi.z * std::f32::consts::FRAC_1_PI;
-        (pdf > 0.0).then_some(BsdfSample {
+        let diffuse = match &self.kind {
+            Kind::Diffuse(diffuse) => diffuse,
+            Kind::Stack(stack) => return stack.sample(wo, u_lobe, u),
+        };
+        let wi = sample_cosine(u);
+        let pdf = wi.z * FRAC_1_PI;
+        if pdf <= 0.0 || diffuse.color.is_black() {
+            return None;
+        }
+        let weight = diffuse.evaluate(wo, wi) * (1.0 / pdf);
+        Some(BsdfSample {
             scattered: Scattered::Toward(wi),
             event: Event::Diffuse,
-            weight: self.parameters.base_color,
+            weight,
+            diffuse: weight,
             pdf: SampledSpectrum::splat(pdf),
         })
     }
 
     /// The values for a pair of directions.
     pub fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluated<N> {
-        let pdf = if wo.z > 0.0 { wi.z.max(0.0) * std::f32::consts::FRAC_1_PI } else { 0.0 };
-        Evaluated {
-            diffuse: self.parameters.base_color * pdf,
-            glossy: SampledSpectrum::ZERO,
-            pdf: SampledSpectrum::splat(pdf),
+        if wo.z <= 0.0 {
+            return Evaluated::NOTHING;
+        }
+        match &self.kind {
+            Kind::Diffuse(_) if wi.z <= 0.0 => Evaluated::NOTHING,
+            Kind::Diffuse(diffuse) => Evaluated {
+                diffuse: diffuse.evaluate(wo, wi),
+                glossy: SampledSpectrum::ZERO,
+                pdf: SampledSpectrum::splat(wi.z * FRAC_1_PI),
+            },
+            Kind::Stack(stack) => stack.evaluate(wo, wi),
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -216,6 +216,12 @@ impl Aggregate {
         Some(self.extent_of(instance)?.bounds)
     }
 
+    /// Whether an instance stands where it is and as it is at all times.
+    pub(crate) fn stands_still(&self, instance: u32) -> bool {
+        let deforms = matches!(self.shape(instance), Shape::Mesh(mesh) if mesh.is_deforming());
+        !deforms && !self.is_instance_moving(instance)
+    }
+
     fn is_instance_moving(&self, instance: u32) -> bool {
         match self.numbering.locate(instance) {
             Location::Single(i) => matches!(self.singles[i].1, Standing::Moving(_)),
@@ -323,6 +329,12 @@ impl Aggregate {
             Shape::Sphere(_) | Shape::Solid(_) => None,
             Shape::Mesh(mesh) => mesh.uv(hit.primitive, hit.barycentric),
         }
+    }
+
+    /// How the point moves with each texture coordinate at a hit of a ray at `time`: ∂p/∂u and ∂p/∂v; `None` where none are
+    /// authored, or where they are the same all over the triangle.
+    pub fn tangents(&self, hit: &Hit, time: f64) -> Option<[DVec3; 2]> {
+        self.with(hit.instance, time, |placed| placed.tangents(hit)).expect("it was met at this time")
     }
 
     /// The primvar with a number at a hit; `None` where the shape has none (always, for analytic shapes).

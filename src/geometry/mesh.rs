@@ -306,6 +306,19 @@ impl Mesh {
         }))
     }
 
+    /// How the point of a triangle, whose `edges` go out from its first corner, moves with each texture coordinate: ∂p/∂u and ∂p/∂v.
+    /// `None` without coordinates, or where they do not tell the points of the triangle apart.
+    pub(super) fn tangents(&self, primitive: u32, edges: [DVec3; 2]) -> Option<[DVec3; 2]> {
+        let corners = self.uv.as_ref()?.at::<2>(self.triangles[primitive as usize], primitive);
+        let [a, b, c] = corners.map(|uv| uv.map(f64::from));
+        let [du1, dv1, du2, dv2] = [b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]];
+        // e₁ = du₁ p_u + dv₁ p_v and e₂ = du₂ p_u + dv₂ p_v, solved for p_u and p_v.
+        let determinant = du1 * dv2 - du2 * dv1;
+        let [e1, e2] = edges;
+        let tangents = [(e1 * dv2 - e2 * dv1) / determinant, (e2 * du1 - e1 * du2) / determinant];
+        tangents.iter().all(|t| t.is_finite() && *t != DVec3::ZERO).then_some(tangents)
+    }
+
     /// The value at a point of a triangle of the primvar with a number, missing components 0; `None` if there is none.
     pub(super) fn primvar(&self, number: usize, primitive: u32, barycentric: [f64; 2]) -> Option<[f32; 4]> {
         let (columns, values) = match self.uv_number == Some(number) {

@@ -51,6 +51,7 @@ pub use sphere::Sphere;
 pub use subdivision::{
     BoundaryInterpolation, FaceVaryingInterpolation, MAX_TRIANGLES, Scheme, Subdivision, TriangleRule,
 };
+pub(crate) use tree::{Bounds, Tree};
 
 /// A ray in render space.
 #[derive(Clone, Copy, Debug, PartialEq)]

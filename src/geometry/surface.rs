@@ -53,6 +53,13 @@ impl Placed<'_> {
         (point, surface.unwrap_or(flat))
     }
 
+    /// ∂p/∂u and ∂p/∂v of the texture coordinates; `None` where there are none.
+    pub(super) fn tangents(&self, hit: &Hit) -> Option<[DVec3; 2]> {
+        let Shape::Mesh(mesh) = self.shape else { return None };
+        let [a, b, c] = mesh.corners(hit.primitive, self.time);
+        mesh.tangents(hit.primitive, [self.linear * (b - a), self.linear * (c - a)])
+    }
+
     fn ellipsoid(&self, sphere: Sphere, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
         let object = self.ray(ray);
         let p = sphere.project(object.origin + hit.distance * object.stretch * object.direction);

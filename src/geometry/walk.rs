@@ -51,7 +51,7 @@ impl Tree {
     ///
     /// `spread` ≥ 1 says how many times larger the rounding errors of the caller's own test are than those of a test in
     /// the space of the boxes.
-    pub(super) fn walk(
+    pub(crate) fn walk(
         &self,
         origin: DVec3,
         direction: DVec3,

@@ -111,9 +111,9 @@ impl<'a> BruteForce<'a> {
             let medium = self.media.of(walk.media.current());
             let through = |distance: f64| medium.transmittance(distance).map_or(1.0, |t| t.hero());
             let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
-            if let Some(light) = lighting.intersect(&ray, limit, wavelengths) {
+            lighting.along(&ray, limit, wavelengths, &mut |light| {
                 radiance += throughput * through(light.distance) * light.radiance.hero();
-            }
+            });
             let alpha = f64::from(u8::from(vertices > 0));
             let Some(met) = met else {
                 lighting.environment(&ray, wavelengths, &mut |light| {

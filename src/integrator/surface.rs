@@ -27,18 +27,19 @@ pub(super) struct Met<const N: usize> {
 /// The surface that a ray met.
 pub(super) fn at<const N: usize>(
     view: &View<'_>,
-    _ray: &Ray,
+    ray: &Ray,
     met: &SurfacePoint,
     wavelengths: &Wavelengths<N>,
     interface: Interface<N>,
 ) -> Met<N> {
     let at = view.surface(&met.hit, met.material_id, wavelengths, interface);
+    let frame = view.shading_frame(&met.hit, ray.time, &met.surface, &at);
     let parameters = at.parameters;
     Met {
         parameters,
         presence: at.presence,
-        normal: met.surface.n_s,
-        tangent: None,
+        normal: frame.normal,
+        tangent: at.has_direction().then_some(frame.tangent),
         transmits: parameters.transmission > 0.0 || !parameters.diffuse_transmission.is_black(),
     }
 }

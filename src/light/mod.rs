@@ -16,7 +16,7 @@ mod temperature;
 
 use std::f64::consts::PI;
 
-pub use emission::{Emission, Spectrum};
+pub use emission::{Emission, Spectrum, White};
 pub use environment::Layout;
 use glam::{DMat3, DVec3};
 pub use shadow::Shadow;

@@ -1,3 +1,4 @@
 //! Arithmetic that keeps its digits.
 
 pub mod compensated;
+pub mod piecewise;

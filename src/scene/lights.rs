@@ -5,6 +5,7 @@
 //! which no stage has, are errors.
 
 mod authored;
+mod images;
 mod summary;
 
 use std::collections::HashMap;
@@ -22,6 +23,7 @@ use crate::geometry::{Buffer, affine, is_invertible};
 use crate::light::ies::{self, Profile};
 use crate::light::{Geometry, Light, MaterialSync, Patch, Shape};
 
+pub use images::LightImages;
 pub use summary::{Summary, kinds};
 
 /// More lights than this that point instancers would place are left out: 100 MB of them, and far more than light sampling

@@ -12,6 +12,7 @@ mod network;
 mod nodes;
 mod painter;
 mod resources;
+mod shading_frame;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -30,7 +31,8 @@ use dialect::{Glass, Response, Terminal};
 use law::{Authored, StatedAbsorption};
 use network::Networks;
 use painter::Painter;
-pub(in crate::scene) use resources::Resources;
+pub(in crate::scene) use resources::{Resources, source};
+pub use shading_frame::ShadingFrame;
 use surface::IndexOf;
 pub use surface::{Surface, SurfaceAt};
 use values::Values;

@@ -5,12 +5,13 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use glam::DVec3;
 
 use super::Scene;
-use super::material::{Below, Kind, Material, Surface, SurfaceAt};
+use super::material::{Below, Kind, Material, ShadingFrame, Surface, SurfaceAt};
 use crate::bsdf::Interface;
 use crate::error::{Error, Result};
 use crate::geometry::{Aggregate, Departures, Hit, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
+use crate::ray::LocalSurface;
 use crate::spectrum::{Wavelength, Wavelengths};
 use crate::texture::{MAX_RESULTS, Program};
 
@@ -154,6 +155,13 @@ impl<'a> View<'a> {
         [r, g, b].map(f64::from)
     }
 
+    /// What the material `id` of the surface at `hit` emits: linear Rec. 709 by luminance; `None` where it has no emission.
+    pub fn emission(&self, hit: &Hit, id: u32) -> Option<[f64; 3]> {
+        let program = self.scene.materials[id.checked_sub(1)? as usize].appearance.emission.as_ref()?;
+        let [r, g, b, _] = self.evaluate(program, hit);
+        Some([r, g, b].map(|x| if x > 0.0 && x.is_finite() { f64::from(x) } else { 0.0 }))
+    }
+
     /// Whether the surface at `hit`, whose material is `id`, is as its material says, something else, or not there.
     pub fn presence(&self, hit: &Hit, id: u32) -> Presence {
         let Some(index) = id.checked_sub(1) else { return Presence::AsStated };
@@ -185,6 +193,19 @@ impl<'a> View<'a> {
     ) -> SurfaceAt<N> {
         let surface = self.surface_of(id);
         surface.at(&self.looked_up(surface, hit), wavelengths, interface)
+    }
+
+    /// The frame of what [`surface`](Self::surface) said of `hit`, met at `time`: its normal after the normal map, on the side of
+    /// the geometric normal, and its tangent along u, turned as the material says.
+    pub fn shading_frame<const N: usize>(
+        &self,
+        hit: &Hit,
+        time: f64,
+        local: &LocalSurface,
+        at: &SurfaceAt<N>,
+    ) -> ShadingFrame {
+        let authored = if at.has_direction() { self.aggregate.tangents(hit, time) } else { None };
+        ShadingFrame::new(local, authored, at.normal_map, at.rotation)
     }
 
     /// The share of the surface at `hit` that is there, 0..=1: 1 − this goes straight on, as if nothing were met. The same as

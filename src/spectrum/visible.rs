@@ -14,6 +14,7 @@ use std::sync::LazyLock;
 
 use super::sampled::Wavelengths;
 use super::{LONGEST, SHORTEST, Wavelength, sensor};
+use crate::math::piecewise::{Knot, PiecewiseLinear};
 
 /// Share of the density that is spread evenly.
 const EVEN: f64 = 0.05;
@@ -22,34 +23,21 @@ const LINES: f64 = 0.5;
 /// A light is one with lines if its brightness at a wavelength, seen by the eye, has a mean square of so many squared means. Daylights have
 /// 1.0, black bodies less than 1.1, white LEDs and fluorescent lamps up to 3.
 const PEAKED: f64 = 2.0;
-/// Cells of the guide to the knots, per knot.
-const GUIDE: usize = 2;
-
 /// A density of wavelengths on 360–830 nm, positive everywhere.
 #[derive(Clone, Debug)]
 pub struct Visible {
-    knots: Vec<Knot>,
-    /// The segment in which cell `i` of the unit interval begins.
-    guide: Vec<u32>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Knot {
-    nanometers: f64,
-    /// Per nm.
-    pdf_lambda: f64,
-    /// ∫ p from 360 nm to here.
-    below: f64,
+    density: PiecewiseLinear,
 }
 
 /// The density for the eye alone.
 pub static EYE: LazyLock<Visible> = LazyLock::new(|| {
     let shape = |nm: f64| sensor::rec709(Wavelength::from_nanometers(nm)).length();
-    let table = whole_nanometers().map(|nm| (nm, shape(nm))).collect();
-    let responses = Visible::new(table);
+    let table: Vec<_> = whole_nanometers().map(|nm| (nm, shape(nm))).collect();
+    let responses = PiecewiseLinear::new(&table);
     let even = EVEN / (LONGEST.nanometers() - SHORTEST.nanometers());
-    let mixed = |knot: &Knot| (knot.nanometers, (1.0 - EVEN) * knot.pdf_lambda + even);
-    Visible::new(responses.knots.iter().map(mixed).collect())
+    let mixed = |knot: &Knot| (knot.x, (1.0 - EVEN) * knot.pdf + even);
+    let table: Vec<_> = responses.knots().iter().map(mixed).collect();
+    Visible { density: PiecewiseLinear::new(&table) }
 });
 
 fn whole_nanometers() -> impl Iterator<Item = f64> {
@@ -57,31 +45,6 @@ fn whole_nanometers() -> impl Iterator<Item = f64> {
 }
 
 impl Visible {
-    /// Proportional to the linear interpolation of `table`, from 360 to 830 nm in increasing order, which must be positive somewhere.
-    fn new(table: Vec<(f64, f64)>) -> Self {
-        let area = |a: (f64, f64), b: (f64, f64)| 0.5 * (a.1 + b.1) * (b.0 - a.0);
-        let total: f64 = table.windows(2).map(|pair| area(pair[0], pair[1])).sum();
-        let mut below = 0.0;
-        let mut knots: Vec<Knot> = Vec::with_capacity(table.len());
-        for (i, &(nanometers, value)) in table.iter().enumerate() {
-            if i > 0 {
-                below += area(table[i - 1], table[i]) / total;
-            }
-            knots.push(Knot { nanometers, pdf_lambda: value / total, below });
-        }
-        let cells = GUIDE * knots.len();
-        let mut segment = 0;
-        let guide = (0..cells)
-            .map(|cell| {
-                while segment + 2 < knots.len() && knots[segment + 1].below <= cell as f64 / cells as f64 {
-                    segment += 1;
-                }
-                segment as u32
-            })
-            .collect();
-        Self { knots, guide }
-    }
-
     /// For the eye and for lights with the spectra `lights`: points (nm, power per nm) in increasing order, linear in between and 0
     /// outside. Those with lines get a share of the wavelengths each, however narrow their lines are; the others have no influence, nor have
     /// tables that are no spectra.
@@ -93,18 +56,19 @@ impl Visible {
         }
         let each = LINES / peaked.len() as f64;
         let mut places: Vec<f64> = whole_nanometers().collect();
-        places.extend(peaked.iter().flat_map(|light| light.knots.iter().map(|knot| knot.nanometers)));
+        places.extend(peaked.iter().flat_map(|light| light.knots().iter().map(|knot| knot.x)));
         places.sort_by(f64::total_cmp);
         places.dedup();
         let mixed = |nm: f64| {
-            let lines: f64 = peaked.iter().map(|light| each * light.pdf_lambda(nm)).sum();
+            let lines: f64 = peaked.iter().map(|light| each * light.pdf(nm)).sum();
             (nm, (1.0 - LINES) * EYE.pdf_lambda(nm) + lines)
         };
-        Self::new(places.into_iter().map(mixed).collect())
+        let table: Vec<_> = places.into_iter().map(mixed).collect();
+        Self { density: PiecewiseLinear::new(&table) }
     }
 
     /// The density that is proportional to what the eye sees of a light; `None` if that is nothing.
-    fn seen(light: &[(f64, f64)]) -> Option<Self> {
+    fn seen(light: &[(f64, f64)]) -> Option<PiecewiseLinear> {
         let is_table = light.windows(2).all(|pair| pair[0].0 < pair[1].0);
         if !is_table || light.iter().any(|(nm, power)| !nm.is_finite() || !power.is_finite() || *power < 0.0) {
             return None;
@@ -129,48 +93,20 @@ impl Visible {
             }
         };
         let table: Vec<_> = places.into_iter().map(|nm| (nm, EYE.pdf_lambda(nm) * power(nm))).collect();
-        table.iter().any(|(_, value)| *value > 0.0).then(|| Self::new(table))
+        table.iter().any(|(_, value)| *value > 0.0).then(|| PiecewiseLinear::new(&table))
     }
 
     /// ∫ q²/p dλ of a density `q`, by the trapezium rule over its knots: 1 for p itself.
-    fn spread(&self, q: &Self) -> f64 {
-        let value = |knot: &Knot| knot.pdf_lambda * knot.pdf_lambda / self.pdf_lambda(knot.nanometers);
-        let area =
-            |pair: &[Knot]| 0.5 * (value(&pair[0]) + value(&pair[1])) * (pair[1].nanometers - pair[0].nanometers);
-        q.knots.windows(2).map(area).sum()
+    fn spread(&self, q: &PiecewiseLinear) -> f64 {
+        let value = |knot: &Knot| knot.pdf * knot.pdf / self.pdf_lambda(knot.x);
+        let area = |pair: &[Knot]| 0.5 * (value(&pair[0]) + value(&pair[1])) * (pair[1].x - pair[0].x);
+        q.knots().windows(2).map(area).sum()
     }
 
     /// Density at `nm`, per nm; 0 outside 360–830 nm.
     #[inline]
     pub fn pdf_lambda(&self, nm: f64) -> f64 {
-        if !(SHORTEST.nanometers()..=LONGEST.nanometers()).contains(&nm) {
-            return 0.0;
-        }
-        let after = self.knots.partition_point(|knot| knot.nanometers <= nm).min(self.knots.len() - 1);
-        Self::between(&self.knots[after - 1], &self.knots[after], nm)
-    }
-
-    fn between(a: &Knot, b: &Knot, nm: f64) -> f64 {
-        let t = (nm - a.nanometers) / (b.nanometers - a.nanometers);
-        a.pdf_lambda + t * (b.pdf_lambda - a.pdf_lambda)
-    }
-
-    /// The wavelength, nm, below which the share `u` of the density lies, and the density there.
-    #[inline]
-    fn inverse(&self, u: f64) -> (f64, f64) {
-        let cell = ((u * self.guide.len() as f64) as usize).min(self.guide.len() - 1);
-        let mut segment = self.guide[cell] as usize;
-        while segment + 2 < self.knots.len() && self.knots[segment + 1].below <= u {
-            segment += 1;
-        }
-        let (a, b) = (&self.knots[segment], &self.knots[segment + 1]);
-        let width = b.nanometers - a.nanometers;
-        let slope = (b.pdf_lambda - a.pdf_lambda) / width;
-        // p₀t + ½ slope t² = c, in the form that does not cancel.
-        let c = (u - a.below).max(0.0);
-        let root = (a.pdf_lambda * a.pdf_lambda + 2.0 * slope * c).max(0.0).sqrt();
-        let nm = a.nanometers + (2.0 * c / (a.pdf_lambda + root)).clamp(0.0, width);
-        (nm, Self::between(a, b, nm))
+        self.density.pdf(nm)
     }
 
     /// Wavelengths for the hero's place `u` in 0..1.
@@ -179,7 +115,7 @@ impl Visible {
         let (mut nanometers, mut pdf_lambda) = ([0.0; N], [0.0; N]);
         for lane in 0..N {
             let place = u + lane as f64 / N as f64;
-            let (nm, pdf) = self.inverse(if place >= 1.0 { place - 1.0 } else { place });
+            let (nm, pdf) = self.density.inverse(if place >= 1.0 { place - 1.0 } else { place });
             (nanometers[lane], pdf_lambda[lane]) = (nm, pdf as f32);
         }
         Wavelengths { nanometers, pdf_lambda }
@@ -223,26 +159,6 @@ mod tests {
     }
 
     #[test]
-    fn the_inverse_is_that_of_the_integral() {
-        for density in [EYE.clone(), Visible::with_lights([&LINE[..]])] {
-            let mut before = 360.0;
-            for i in 0..=10_000 {
-                let u = (f64::from(i) / 10_000.0).min(1.0 - f64::EPSILON);
-                let (nm, pdf) = density.inverse(u);
-                assert!(nm >= before && nm <= 830.0);
-                assert!((pdf / density.pdf_lambda(nm) - 1.0).abs() < 1e-10, "{nm}");
-                // The parabola from the knot below, added to its share.
-                let after = density.knots.partition_point(|knot| knot.nanometers <= nm).min(density.knots.len() - 1);
-                let knot = &density.knots[after - 1];
-                let below = knot.below + 0.5 * (knot.pdf_lambda + pdf) * (nm - knot.nanometers);
-                assert!((below - u).abs() < 1e-12, "{u} {nm} {below}");
-                before = nm;
-            }
-            assert!((density.inverse(0.0).0 - 360.0).abs() < 1e-12 && (density.inverse(1.0).0 - 830.0).abs() < 1e-9);
-        }
-    }
-
-    #[test]
     fn companions_divide_the_interval_evenly() {
         let wavelengths = sample::<4>(0.6);
         for lane in 0..4 {
@@ -275,7 +191,7 @@ mod tests {
         let black = table(&|_| 0.0);
         let backwards = [(600.0, 1.0), (500.0, 1.0)];
         let density = Visible::with_lights([&daylight[..], &black[..], &backwards[..], &[]]);
-        assert_eq!(density.knots.len(), EYE.knots.len());
+        assert_eq!(density.density.knots().len(), EYE.density.knots().len());
         let spread = EYE.spread(&Visible::seen(&daylight).unwrap());
         assert!((1.0..1.1).contains(&spread), "{spread}");
     }

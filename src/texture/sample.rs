@@ -117,6 +117,15 @@ impl Lookup {
         Some(mix(mix(texel(i, j), texel(i + 1, j), s), mix(texel(i, j + 1), texel(i + 1, j + 1), s), t))
     }
 
+    /// Width and height of the image, the first of tiles, texels; `None` if it cannot be read.
+    pub fn dimensions(&self, store: &Store) -> Option<[u32; 2]> {
+        let number = match &self.images {
+            Images::Single(number) => *number,
+            Images::Tiles(tiles) => tiles.first()?.1,
+        };
+        store.image(number).map(|image| [image.width, image.height])
+    }
+
     fn texel(&self, store: &Store, image: &Image, space: &ColorSpace, wrap: [Wrap; 2], [i, j]: [i64; 2]) -> [f32; 4] {
         // Rows run against v, which mirrors and repeats the same either way.
         let column = wrap[0].texel(i, i64::from(image.width));

@@ -122,6 +122,11 @@ impl Store {
         self.budget.store(bytes, Ordering::Relaxed);
     }
 
+    /// The budget, bytes; 0 for the default.
+    pub fn budget_set(&self) -> u64 {
+        self.budget.load(Ordering::Relaxed)
+    }
+
     /// How many images there are.
     pub fn len(&self) -> usize {
         self.slots.len()

@@ -173,3 +173,41 @@ fn normals_of_the_facets_are_dropped() {
     let (mesh, _) = Mesh::from_polygons(&cube).expect("a cube");
     assert!(!mesh.has_normals());
 }
+
+#[test]
+fn tangents_are_the_derivatives_of_the_point_by_the_texture_coordinates() {
+    let points = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.3], [0.2, 1.2, -0.4], [1.4, 1.1, 0.6]];
+    let with_uv = |uv: &[f32]| {
+        let view =
+            PrimvarView { values: Buffer::from_vec(uv.to_vec()), indices: None, interpolation: Interpolation::Vertex };
+        let polygons =
+            abbe::geometry::PolygonMesh { uv: Some(view), ..polygons(&points, &[3, 3], &[0, 1, 2, 1, 3, 2]) };
+        let mesh = Mesh::from_polygons(&polygons).expect("a mesh").0;
+        aggregate(&[placed(&Arc::new(Shape::Mesh(mesh)), skew())])
+    };
+    // A turned, stretched and mirrored chart.
+    let scene = with_uv(&[0.1, 0.2, 0.9, -0.3, -0.4, -0.7, 0.3, -1.5]);
+    for (x, y) in [(0.2, 0.2), (0.5, 0.3), (0.9, 0.9)] {
+        let target = skew().transform_point3(DVec3::new(x, y, 0.0));
+        let r = ray(target + DVec3::new(0.1, 0.2, 4.0), DVec3::new(-0.1, -0.2, -4.0).normalize());
+        let hit = first(&scene, &r).expect("a hit");
+        let [p_u, p_v] = scene.tangents(&hit, 0.0).expect("has coordinates");
+        let (point, local) = surface_at(&scene, &r);
+        assert!(p_u.dot(local.n_g).abs() < 1e-14 && p_v.dot(local.n_g).abs() < 1e-14);
+        let [u, v] = scene.uv(&hit, point).expect("has coordinates");
+        for step in [DVec3::X, DVec3::Y] {
+            let moved = Ray { origin: r.origin + 1e-3 * step, ..r };
+            let other = first(&scene, &moved).expect("a hit");
+            assert_eq!(other.primitive, hit.primitive);
+            let q = surface_at(&scene, &moved).0;
+            let [u1, v1] = scene.uv(&other, q).expect("has coordinates");
+            assert!((point + p_u * (u1 - u) + p_v * (v1 - v) - q).length() < 1e-14, "{step}");
+        }
+    }
+    // Coordinates that do not tell points apart.
+    for uv in [[0.5; 8], [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]] {
+        let scene = with_uv(&uv);
+        let r = ray(skew().transform_point3(DVec3::new(0.3, 0.3, 0.0)) + 4.0 * DVec3::Z, -DVec3::Z);
+        assert_eq!(scene.tangents(&first(&scene, &r).expect("a hit"), 0.0), None);
+    }
+}

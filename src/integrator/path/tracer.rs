@@ -76,7 +76,10 @@ impl<const N: usize> State<N> {
             self.radiance += self.throughput * met.radiance * by_lanes;
             return;
         };
-        let pdf = lighting.pdf(&vertex.receiver, direction, met.light, met.distance);
+        if !lighting.is_linked(met.light, vertex.receiver.object) {
+            return;
+        }
+        let pdf = lighting.pdf(&vertex.receiver, direction, met);
         let mut seen = met.radiance;
         if let Some(light) = lighting.light(met.light)
             && has_factors(light)
@@ -140,12 +143,12 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
             let medium = self.media.of(walk.media.current());
             let ray = walk.ray;
-            if let Some(mut light) = self.lighting.intersect(&ray, limit, &wavelengths) {
+            self.lighting.along(&ray, limit, &wavelengths, &mut |mut light| {
                 if let Some(through) = medium.transmittance(light.distance) {
                     light.radiance *= through;
                 }
                 state.meet::<DISPERSIVE>(self.lighting, ray.direction, &light);
-            }
+            });
             let Some(met) = met else {
                 // What absorbs lets nothing through from infinitely far.
                 let absorbs = |sigma: &SampledSpectrum<N>| sigma.0.iter().any(|&sigma| sigma > 0.0);

@@ -355,7 +355,7 @@ fn gltf_image(
         return channel(b.binary(F::Multiply, tinted, geometry)?, output, b);
     }
     if id.starts_with("ND_gltf_normalmap") {
-        return Ok(texel);
+        return signed(texel, b);
     }
     let factor = inputs.number("factor", 1.0, b)?;
     let texel = b.binary(F::Multiply, texel, factor)?;
@@ -440,6 +440,27 @@ fn computed(
     }
 }
 
+/// A normal in the frame of the surface's tangents, −1 to 1: what is made of it stays there.
+fn normal_map(inputs: &Inputs<'_>, variant: &str, b: &mut Builder) -> Compiled<Register> {
+    if let Some(space) = inputs.text("space").filter(|&space| space != "tangent") {
+        return inputs.unknown(format!("a normal map in {space} space"));
+    }
+    let texel = inputs.or("in", [0.5, 0.5, 1.0, 0.0], b)?;
+    let (normal, scale) = (signed(texel, b)?, inputs.number("scale", 1.0, b)?);
+    let x = b.swizzle(scale, "x")?;
+    let y = if variant == "vector2" { b.swizzle(scale, "y")? } else { x };
+    let one = b.number(1.0)?;
+    let scale = b.combine([x, y, one, one])?;
+    Ok(b.binary(F::Multiply, normal, scale)?)
+}
+
+/// 2x − 1
+fn signed(texel: Register, b: &mut Builder) -> Compiled<Register> {
+    let (two, one) = (b.number(2.0)?, b.number(1.0)?);
+    let twice = b.binary(F::Multiply, texel, two)?;
+    Ok(b.binary(F::Subtract, twice, one)?)
+}
+
 /// What maya-usd writes behind an image: gain and offset of a Maya file node.
 fn maya_file(inputs: &Inputs<'_>, b: &mut Builder) -> Compiled<Register> {
     const READ: [&str; 5] = ["inColor", "uvCoord", "defaultColor", "colorGain", "colorOffset"];
@@ -468,6 +489,9 @@ fn materialx(
     let last = variant.rsplit('_').next().unwrap_or_default();
     let kind = last.trim_end_matches(['A', 'B', 'C', 'F', 'I', 'V']);
     let suffix = &last[kind.len()..];
+    if category == "normalmap" {
+        return normal_map(inputs, variant, b);
+    }
     let Some(width) = width(kind) else { return inputs.unknown(format!("the node 'ND_{rest}'")) };
 
     let unary = |function, b: &mut Builder| {
@@ -489,8 +513,6 @@ fn materialx(
         }
         "constant" => inputs.number("value", 0.0, b),
         "dot" => inputs.number("in", 0.0, b),
-        // In the frame of the surface's tangents, as the image has it.
-        "normalmap" => inputs.or("in", [0.5, 0.5, 1.0, 0.0], b),
         "add" => binary(F::Add, 0.0, b),
         "subtract" => binary(F::Subtract, 0.0, b),
         "multiply" => binary(F::Multiply, 1.0, b),

@@ -326,6 +326,16 @@ pub struct SurfaceAt<const N: usize> {
     pub rotation: f32,
 }
 
+impl<const N: usize> SurfaceAt<N> {
+    /// Whether it matters which way its tangent points.
+    #[allow(clippy::float_cmp, reason = "isotropic materials have the same number twice")]
+    pub fn has_direction(&self) -> bool {
+        let differs = |[along, across]: [f32; 2]| along != across;
+        let Parameters { alpha, coat, .. } = &self.parameters;
+        self.normal_map.is_some() || differs(*alpha) || coat.is_some_and(|coat| differs(coat.alpha))
+    }
+}
+
 /// Sorts registers into constants and results.
 struct Compiler<'p, 'a, 'n, 'd> {
     p: &'p mut Painter<'a, 'n, 'd>,
@@ -395,6 +405,11 @@ impl Surface {
         index: IndexOf<'_>,
         p: &mut Painter<'_, '_, '_>,
     ) -> Painted<Self> {
+        // The index of a medium counts as it is: there the weight tints.
+        let (specular_weight, specular_color) = match index {
+            IndexOf::Media => (p.constant(1.0)?, p.multiply(layers.specular_color, layers.specular_weight)?),
+            _ => (layers.specular_weight, layers.specular_color),
+        };
         let mut c = Compiler { p, results: Vec::new() };
         let metalness = c.share(layers.metalness);
         let metal = match (conductor, layers.metal) {
@@ -440,8 +455,8 @@ impl Surface {
             diffuse_roughness: c.share(layers.diffuse_roughness),
             metalness,
             metal,
-            specular_weight: c.number(layers.specular_weight, 0.0, f32::MAX),
-            specular_color: c.tint(layers.specular_color),
+            specular_weight: c.number(specular_weight, 0.0, f32::MAX),
+            specular_color: c.tint(specular_color),
             alpha: layers.alpha.map(|alpha| c.share(alpha)),
             schlick_f0: layers.schlick_f0.map(|f0| c.tint(f0)),
             diffuse_transmission: c.tint(layers.diffuse_transmission),

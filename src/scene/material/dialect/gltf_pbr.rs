@@ -110,12 +110,11 @@ impl Dialect for GltfPbr {
 
     fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
         let color = p.color(BASE_COLOR)?;
-        // F0 = min(((1 − n)/(1 + n))² specular_color, 1) specular.
+        // F0 = min(((1 − n)/(1 + n))² specular_color, 1); where there is a film it is on the index.
         let (ior, specular, specular_color) = (p.number(IOR)?, p.number(SPECULAR)?, p.color(SPECULAR_COLOR)?);
         let f0 = f0_of(ior, p)?;
         let (f0, white) = (p.multiply(specular_color, f0)?, p.gray(1.0)?);
         let f0 = p.min(f0, white)?;
-        let f0 = p.multiply(f0, specular)?;
         let clearcoat_roughness = p.number(CLEARCOAT_ROUGHNESS)?;
         let coat = CoatLayer {
             weight: p.number(CLEARCOAT)?,
@@ -135,6 +134,7 @@ impl Dialect for GltfPbr {
             thickness_nm: p.number(IRIDESCENCE_THICKNESS)?,
             ior: p.number(IRIDESCENCE_IOR)?,
         };
+        let has_film = p.b().value(film.weight) != Some([0.0; 4]);
         // KHR_materials_anisotropy: α_t = mix(α, 1, strength²), α_b = α.
         let roughness = p.number(ROUGHNESS)?;
         let (alpha, strength) = (p.square(roughness)?, p.number(ANISOTROPY_STRENGTH)?);
@@ -146,7 +146,9 @@ impl Dialect for GltfPbr {
         Ok(Layers {
             metalness: p.number(METALLIC)?,
             metal: MetalLayer::Tint { f0: color, f82: white },
-            schlick_f0: Some(f0),
+            specular_weight: specular,
+            specular_color: if has_film { specular_color } else { white },
+            schlick_f0: (!has_film).then_some(f0),
             alpha: [along, alpha],
             transmission: p.number(TRANSMISSION)?,
             transmission_tint: color,

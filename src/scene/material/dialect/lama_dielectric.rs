@@ -56,6 +56,8 @@ impl Dialect for LamaDielectric {
 
     fn layers(&self, p: &mut Painter<'_, '_, '_>) -> Painted<Layers> {
         let (white, roughness, anisotropy) = (p.gray(1.0)?, p.number(ROUGHNESS)?, p.number(ANISOTROPY)?);
+        let (turns, minus) = (p.number(ROTATION)?, p.constant(-1.0)?);
+        let rotation = p.multiply(turns, minus)?;
         let ior = match p.word(FRESNEL_MODE, &["Artistic", "Scientific"]) {
             "Scientific" => p.number(IOR)?,
             _ => {
@@ -69,7 +71,7 @@ impl Dialect for LamaDielectric {
             transmission: p.constant(1.0)?,
             transmission_tint: p.color(TRANSMISSION_TINT)?,
             normal: p.network(NORMAL),
-            rotation: p.number(ROTATION)?,
+            rotation,
             ..Layers::plastic(white, ior, p)?
         })
     }

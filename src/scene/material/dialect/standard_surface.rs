@@ -146,6 +146,9 @@ impl Dialect for StandardSurface {
             reflectivity: p.multiply(color, weight)?,
             edge: p.multiply(specular_color, specular)?,
         };
+        // MaterialX' `rotate3d` turns clockwise.
+        let (turns, minus) = (p.number(ROTATION)?, p.constant(-1.0)?);
+        let rotation = p.multiply(turns, minus)?;
         let ior = p.number(IOR)?;
         Ok(Layers {
             diffuse_roughness: p.number(DIFFUSE_ROUGHNESS)?,
@@ -164,7 +167,7 @@ impl Dialect for StandardSurface {
             presence: p.mean_of_color(OPACITY)?,
             emission: p.multiply(emission_color, emission)?,
             normal: p.network(NORMAL),
-            rotation: p.number(ROTATION)?,
+            rotation,
             ..Layers::plastic(diffuse, ior, p)?
         })
     }

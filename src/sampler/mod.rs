@@ -5,10 +5,27 @@
 //! pixel and dimension (B. Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020): the first 2ⁿ samples of a pixel are
 //! stratified in every dimension, so that neither subsets nor growing numbers of samples lose by it.
 
-use crate::error::{Error, Result};
+pub mod filter;
 
-/// The most samples a pixel can have: the length of the Sobol' sequence that `sobol_burley` holds.
-pub const MAX_SAMPLES: u32 = 1 << 16;
+use crate::error::{Error, Result};
+use filter::Filter;
+
+/// The most samples a pixel can have. Their indices count in `u32` with room for the nodes of sums over them.
+pub const MAX_SAMPLES: u32 = 1 << 24;
+
+/// The length of the Sobol' sequence that `sobol_burley` holds. Longer renders go through it again and again, each time in another
+/// scramble: every such block is stratified, and blocks are independent of each other.
+const BLOCK: u32 = 1 << 16;
+
+/// An index within its block and the seed of the block, from the seed of a pixel.
+#[inline]
+fn in_block(index: u32, seed: u64) -> (u32, u32) {
+    let seed = match index / BLOCK {
+        0 => seed,
+        block => hash(seed ^ hash(u64::from(block))),
+    };
+    (index % BLOCK, (seed ^ (seed >> 32)) as u32)
+}
 
 /// The Sobol' dimension of the time.
 const TIME: u32 = 4;
@@ -33,7 +50,8 @@ pub struct PathSampler {
 impl PathSampler {
     /// The place of the hero wavelength, 0..1: stratified over the pixel's samples.
     pub fn wavelength(&self) -> f64 {
-        sobol_burley::sample(self.index, WAVELENGTH, self.folded()).into()
+        let (index, seed) = in_block(self.index, self.seed);
+        sobol_burley::sample(index, WAVELENGTH, seed).into()
     }
 
     /// Four numbers in 0..1, the next of the path.
@@ -42,7 +60,8 @@ impl PathSampler {
         let group = self.group;
         self.group += 1;
         if group < GROUPS {
-            return sobol_burley::sample_4d(self.index, group, self.folded());
+            let (index, seed) = in_block(self.index, self.seed);
+            return sobol_burley::sample_4d(index, group, seed);
         }
         let mut state = hash(self.seed ^ (u64::from(self.index) << 32 | u64::from(group)));
         std::array::from_fn(|_| {
@@ -56,10 +75,6 @@ impl PathSampler {
     pub fn of(&self, what: u64) -> f32 {
         let state = hash(self.seed ^ hash(what ^ (u64::from(self.index) << 32 | u64::from(self.group))));
         (state >> 40) as f32 * (1.0 / 16_777_216.0)
-    }
-
-    fn folded(&self) -> u32 {
-        (self.seed ^ (self.seed >> 32)) as u32
     }
 }
 
@@ -87,11 +102,13 @@ impl CameraSample {
 }
 
 /// Samples of pixels.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Sampler {
     samples: u32,
     seed: u64,
     over_time: bool,
+    /// `None` for the pixel itself.
+    filter: Option<Filter>,
 }
 
 impl Sampler {
@@ -100,12 +117,17 @@ impl Sampler {
         if samples == 0 || samples > MAX_SAMPLES {
             return Err(Error::usage("--samples", format!("must be 1 to {MAX_SAMPLES}, not {samples}")));
         }
-        Ok(Self { samples, seed, over_time: false })
+        Ok(Self { samples, seed, over_time: false, filter: None })
     }
 
     /// The same sampler, with samples spread over time, or all in the middle of it. Nothing else of a sample changes.
     pub fn over_time(self, over_time: bool) -> Self {
         Self { over_time, ..self }
+    }
+
+    /// The same sampler, with samples spread over the pixel as `filter` weighs its surroundings. Nothing else of a sample changes.
+    pub fn filtered(self, filter: &Filter) -> Self {
+        Self { filter: (!filter.is_pixel()).then(|| filter.clone()), ..self }
     }
 
     /// The numbers of the path that sample `index` of `pixel` begins.
@@ -131,11 +153,17 @@ impl Sampler {
         if self.samples == 1 {
             return CameraSample::at(x + 0.5, y + 0.5);
         }
-        let seed = self.pixel_seed(pixel);
-        let [dx, dy, u, v] = sobol_burley::sample_4d(index, 0, (seed ^ (seed >> 32)) as u32).map(f64::from);
-        let time =
-            if self.over_time { sobol_burley::sample(index, TIME, (seed ^ (seed >> 32)) as u32).into() } else { 0.5 };
-        CameraSample { raster: [x + dx, y + dy], lens: [u, v], time }
+        let (index, seed) = in_block(index, self.pixel_seed(pixel));
+        let [dx, dy, u, v] = sobol_burley::sample_4d(index, 0, seed).map(f64::from);
+        let time = if self.over_time { sobol_burley::sample(index, TIME, seed).into() } else { 0.5 };
+        let raster = match &self.filter {
+            None => [x + dx, y + dy],
+            Some(filter) => {
+                let [dx, dy] = filter.offset([dx, dy]);
+                [x + 0.5 + dx, y + 0.5 + dy]
+            }
+        };
+        CameraSample { raster, lens: [u, v], time }
     }
 }
 
@@ -179,6 +207,40 @@ mod tests {
         };
         assert_ne!(within(0, [0, 0]), within(0, [1, 0]));
         assert_ne!(within(0, [0, 0]), within(1, [0, 0]));
+    }
+
+    #[test]
+    fn blocks_beyond_the_sequence_are_stratified_and_differ() {
+        let sampler = Sampler::new(1 << 17, 1).unwrap();
+        let offset = |index| sampler.sample([3, 4], index).moved(-3.0, -4.0).raster;
+        let mut counts = [0; 4];
+        for i in 0..64 {
+            let [x, y] = offset(BLOCK + i);
+            counts[usize::from(x >= 0.5) + 2 * usize::from(y >= 0.5)] += 1;
+            assert_ne!(offset(BLOCK + i), offset(i));
+        }
+        assert_eq!(counts, [16; 4]);
+        let mut path = sampler.path([3, 4], BLOCK + 5);
+        assert_ne!(path.wavelength(), sampler.path([3, 4], 5).wavelength());
+        assert_ne!(path.next(), sampler.path([3, 4], 5).next());
+    }
+
+    #[test]
+    fn a_filter_moves_samples_about_the_centre_and_nothing_else() {
+        let plain = Sampler::new(64, 1).unwrap();
+        let filtered = plain.clone().filtered(&Filter::new(filter::Shape::BlackmanHarris, 3.0).unwrap());
+        let mut mean = [0.0; 2];
+        for i in 0..64 {
+            let (a, b) = (plain.sample([5, 6], i), filtered.sample([5, 6], i));
+            assert_eq!((a.lens, a.time), (b.lens, b.time));
+            mean[0] += (b.raster[0] - 5.5) / 64.0;
+            mean[1] += (b.raster[1] - 6.5) / 64.0;
+            assert!(b.moved(-5.5, -6.5).raster.iter().all(|v| v.abs() <= 1.5));
+        }
+        assert!(mean.iter().all(|m| m.abs() < 0.02), "{mean:?}");
+        assert_eq!(plain.sample([5, 6], 7), plain.clone().filtered(&Filter::default()).sample([5, 6], 7));
+        let one = Sampler::new(1, 7).unwrap().filtered(&Filter::new(filter::Shape::Gaussian, 3.0).unwrap());
+        assert_eq!(one.sample([3, -4], 0), CameraSample::at(3.5, -3.5));
     }
 
     #[test]

@@ -1,0 +1,48 @@
+//! The clear coat: a dielectric over everything but the sheen, with a colour that light takes on in it.
+//!
+//! Light that reaches the base passes the coat twice, along 1/cos θ_t each; the colour is stated for going in and out
+//! at normal incidence, so the transmittance is color^{(1/cos θ_t(μ_o) + 1/cos θ_t(μ_i))/2} (Bouguer's law; OpenPBR 1.1).
+
+use super::fresnel::Fresnel;
+use super::gloss::Gloss;
+use super::{Coat, Interface};
+use crate::spectrum::SampledSpectrum;
+
+/// A coat made ready.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CoatLobe<const N: usize> {
+    /// Its interface.
+    pub(super) gloss: Gloss<N>,
+    weight: f32,
+    eta: f32,
+    /// ln color / 2; `None` for a colourless one.
+    half_log: Option<SampledSpectrum<N>>,
+}
+
+impl<const N: usize> CoatLobe<N> {
+    pub(super) fn new(coat: &Coat<N>, interface: &Interface<N>) -> Self {
+        let weight = coat.weight.clamp(0.0, 1.0);
+        let eta = (coat.ior / interface.ior_i.hero()).max(1.0);
+        let colored = coat.color.0.iter().any(|&c| c < 1.0);
+        Self {
+            gloss: Gloss::new(weight, Fresnel::uniform(eta), coat.alpha, SampledSpectrum::ONE),
+            weight,
+            eta,
+            half_log: colored.then(|| coat.color.map(|c| 0.5 * libm::logf(c.clamp(1e-12, 1.0)))),
+        }
+    }
+
+    /// What its colour leaves of light between the base and two directions.
+    #[inline]
+    pub(super) fn absorption(&self, mu_o: f32, mu_i: f32) -> SampledSpectrum<N> {
+        let Some(half_log) = self.half_log else { return SampledSpectrum::ONE };
+        let path = self.path(mu_o) + self.path(mu_i);
+        half_log.map(|log| 1.0 + self.weight * (libm::expf(log * path) - 1.0))
+    }
+
+    /// 1/cos θ_t.
+    fn path(&self, mu: f32) -> f32 {
+        let sine2 = (1.0 - mu * mu).max(0.0) / (self.eta * self.eta);
+        1.0 / (1.0 - sine2).max(1e-4).sqrt()
+    }
+}

@@ -1,0 +1,4 @@
+//! Laws that every scattering model keeps.
+
+mod furnace;
+mod support;
