@@ -11,8 +11,8 @@ use crate::spectrum::SampledSpectrum;
 /// A coat made ready.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CoatLobe<const N: usize> {
-    /// Its interface.
-    pub(super) gloss: Gloss<N>,
+    /// Its interface, the same at every wavelength.
+    pub(super) gloss: Gloss<1>,
     weight: f32,
     eta: f32,
     /// ln color / 2; `None` for a colourless one.

@@ -20,16 +20,16 @@ use std::f32::consts::FRAC_1_PI;
 use super::albedo::{self, At, Roughness};
 use super::fresnel::{self, Fresnel};
 use super::microfacet::{Ggx, mirror};
-use super::{Event, Parameters, Scattered, Slices, diffuse, gloss};
+use super::{BsdfSample, Event, Parameters, Scattered, Slices, diffuse, gloss};
 use crate::spectrum::SampledSpectrum;
 
 /// Indices nearer than this are not refracted by facets: a rough lobe that turns by less than 1e-3 rad, and reflects 2.5e-7, is
 /// narrower than f32 directions resolve.
 const MATCHED: f32 = 1e-3;
 
-/// An interface that reflects and transmits.
+/// What a facet, or a smooth surface, reflects and transmits.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Glass<const N: usize> {
+pub(super) struct Dielectric<const N: usize> {
     /// Its share of the surface.
     pub(super) weight: f32,
     fresnel: Fresnel<N>,
@@ -39,7 +39,13 @@ pub(super) struct Glass<const N: usize> {
     color: SampledSpectrum<N>,
     tint: SampledSpectrum<N>,
     thin: bool,
-    pub(super) ggx: Option<Ggx>,
+}
+
+/// A rough interface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RoughDielectric<const N: usize> {
+    facet: Dielectric<N>,
+    ggx: Ggx,
     multiple: Multiple<N>,
 }
 
@@ -72,85 +78,22 @@ impl<const N: usize> Split<N> {
     }
 }
 
-/// A smooth interface's choice.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Branch<const N: usize> {
-    pub(super) scattered: Scattered,
-    pub(super) event: Event,
-    pub(super) value: SampledSpectrum<N>,
-    pub(super) probability: f32,
-}
-
-impl<const N: usize> Glass<N> {
+impl<const N: usize> Dielectric<N> {
     pub(super) fn new(parameters: &Parameters<N>, eta: SampledSpectrum<N>, weight: f32) -> Self {
-        let fresnel = Fresnel::of_dielectric(parameters, eta);
-        let thin = parameters.thin_walled;
-        let matched = !thin && eta.0.iter().all(|e| (e - 1.0).abs() < MATCHED);
-        let ggx = gloss::distribution(parameters.alpha).filter(|_| !matched);
-        let mut glass = Self {
+        Self {
             weight,
             uniform: eta.0.iter().all(|e| e.to_bits() == eta[0].to_bits()),
-            fresnel,
+            fresnel: Fresnel::of_dielectric(parameters, eta),
             eta,
             color: parameters.specular_color,
             tint: parameters.transmission_tint,
-            thin,
-            ggx,
-            multiple: Multiple {
-                near: [SampledSpectrum::ZERO; albedo::NODES],
-                far: [SampledSpectrum::ZERO; albedo::NODES],
-                reflected: SampledSpectrum::ZERO,
-                transmitted: SampledSpectrum::ZERO,
-                share: 0.0,
-            },
-        };
-        if let Some(ggx) = &ggx {
-            glass.multiple = glass.multiple(Roughness::new(ggx.mean_alpha()));
+            thin: parameters.thin_walled,
         }
-        glass
     }
 
-    fn multiple(&self, roughness: Roughness) -> Multiple<N> {
-        let quotient = |x: f32, mean: f32| if mean > 0.0 { x * FRAC_1_PI / mean } else { 0.0 };
-        if self.thin {
-            let missing = roughness.white().map(|e| (1.0 - e).max(0.0));
-            let mean = albedo::mean(&missing);
-            let near = missing.map(SampledSpectrum::splat);
-            let split = |i| self.split(albedo::node(i));
-            let r = albedo::mean_of_spectra(&std::array::from_fn(|i| split(i).reflected));
-            let t = albedo::mean_of_spectra(&std::array::from_fn(|i| split(i).transmitted));
-            return Multiple {
-                near,
-                far: near,
-                reflected: r.map(|r| quotient(r, mean)),
-                transmitted: t.map(|t| quotient(t, mean)),
-                share: Split { reflected: r, transmitted: t }.probability(),
-            };
-        }
-        let mut multiple = self.multiple;
-        let mut x = SampledSpectrum::<N>::ZERO;
-        let lanes = if self.uniform { 1 } else { N };
-        for lane in 0..lanes {
-            let eta = self.eta[lane];
-            let near = roughness.dielectric_loss(eta);
-            let far = roughness.dielectric_loss(1.0 / eta);
-            let (near_mean, far_mean) = (albedo::mean(&near).max(0.0), albedo::mean(&far).max(0.0));
-            let greater = near_mean.max(far_mean);
-            let share = if greater > 0.0 { (1.0 - fresnel::dielectric_mean(eta)) * far_mean / greater } else { 0.0 };
-            for i in lane..if self.uniform { N } else { lane + 1 } {
-                for node in 0..albedo::NODES {
-                    multiple.near[node][i] = near[node];
-                    multiple.far[node][i] = far[node];
-                }
-                x[i] = share;
-                multiple.reflected[i] = quotient(1.0 - share, near_mean);
-                multiple.transmitted[i] = quotient(share, far_mean);
-            }
-        }
-        multiple.reflected *= self.color;
-        multiple.transmitted *= self.tint;
-        multiple.share = 1.0 - x.mean();
-        multiple
+    /// Whether its indices are too near to each other for facets.
+    fn is_matched(&self) -> bool {
+        !self.thin && self.eta.0.iter().all(|eta| (eta - 1.0).abs() < MATCHED)
     }
 
     /// What a facet sends where, with the tints.
@@ -175,27 +118,41 @@ impl<const N: usize> Glass<N> {
         self.eta.map(|eta| 1.0 / (eta * eta))
     }
 
-    /// The branch that a smooth interface takes; `None` where the hero cannot take it.
-    pub(super) fn branch(&self, cos_i: f32, u: f32) -> Option<Branch<N>> {
+    /// The branch that a smooth interface takes; `None` where the hero cannot take it. `chosen` is the probability of having come here,
+    /// `through` what the layers above leave.
+    pub(super) fn sample(&self, cos_i: f32, u: f32, chosen: f32, through: SampledSpectrum<N>) -> Option<BsdfSample<N>> {
         let split = self.split(cos_i);
         let p = split.probability();
-        if u < p {
-            return Some(Branch {
-                scattered: Scattered::Mirror,
-                event: Event::SpecularReflection,
-                value: split.reflected * self.weight,
-                probability: p,
-            });
-        }
-        if split.transmitted.hero() <= 0.0 {
+        let (scattered, event, value, probability) = if u < p {
+            (Scattered::Mirror, Event::SpecularReflection, split.reflected, p)
+        } else if split.transmitted.hero() <= 0.0 {
             return None;
-        }
-        let (scattered, event, value) = if self.thin {
-            (Scattered::Straight, Event::Straight, split.transmitted)
+        } else if self.thin {
+            (Scattered::Straight, Event::Straight, split.transmitted, 1.0 - p)
         } else {
-            (Scattered::Refract, Event::SpecularTransmission, split.transmitted * self.radiance())
+            (Scattered::Refract, Event::SpecularTransmission, split.transmitted * self.radiance(), 1.0 - p)
         };
-        Some(Branch { scattered, event, value: value * self.weight, probability: 1.0 - p })
+        let probability = chosen * probability;
+        Some(BsdfSample {
+            scattered,
+            event,
+            weight: value * through * (self.weight / probability),
+            diffuse: SampledSpectrum::ZERO,
+            pdf: SampledSpectrum::splat(probability),
+        })
+    }
+}
+
+impl<const N: usize> RoughDielectric<N> {
+    /// `None` where the surface is smooth.
+    pub(super) fn new(facet: &Dielectric<N>, alpha: [f32; 2]) -> Option<Self> {
+        let ggx = gloss::distribution(alpha).filter(|_| !facet.is_matched())?;
+        Some(Self { facet: *facet, ggx, multiple: Multiple::new(facet, Roughness::new(ggx.mean_alpha())) })
+    }
+
+    /// Its share of the surface.
+    pub(super) fn weight(&self) -> f32 {
+        self.facet.weight
     }
 
     /// Probability of the lobes of multiple scattering.
@@ -205,26 +162,26 @@ impl<const N: usize> Glass<N> {
     }
 
     /// Draws a direction off the rough interface; `None` where a facet sends it back into the surface.
-    pub(super) fn sample(&self, ggx: &Ggx, wo: Vec3, at_o: &At, u_lobe: f32, u: [f32; 2]) -> Option<Vec3> {
+    pub(super) fn sample(&self, wo: Vec3, at_o: &At, u_lobe: f32, u: [f32; 2]) -> Option<Vec3> {
         let choice = self.choice(at_o);
         if u_lobe < choice {
             let wi = diffuse::sample_cosine(u);
             return Some(if u_lobe < choice * self.multiple.share { wi } else { Vec3::new(wi.x, wi.y, -wi.z) });
         }
         let v = (u_lobe - choice) / (1.0 - choice);
-        if self.thin {
-            let h = ggx.sample_reflecting(wo, u);
+        if self.facet.thin {
+            let h = self.ggx.sample_reflecting(wo, u);
             let wi = mirror(wo, h);
-            let reflects = v < self.split(wo.dot(h)).probability();
+            let reflects = v < self.facet.split(wo.dot(h)).probability();
             return (wi.z > 0.0).then_some(if reflects { wi } else { Vec3::new(wi.x, wi.y, -wi.z) });
         }
-        let h = ggx.sample_visible(wo, u);
+        let h = self.ggx.sample_visible(wo, u);
         let c = wo.dot(h);
-        if v < self.split(c).probability() {
+        if v < self.facet.split(c).probability() {
             let wi = mirror(wo, h);
             return (wi.z > 0.0).then_some(wi);
         }
-        let eta = self.eta.hero();
+        let eta = self.facet.eta.hero();
         let inside = (eta - 1.0) * (eta + 1.0) + c * c;
         if inside <= 0.0 {
             return None;
@@ -234,47 +191,86 @@ impl<const N: usize> Glass<N> {
     }
 
     /// f |cos θ_i| and density of the rough interface.
-    pub(super) fn evaluate(&self, ggx: &Ggx, wo: Vec3, wi: Vec3, at_o: &At) -> Valued<N> {
+    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3, at_o: &At) -> Valued<N> {
         let cos = wi.z.abs();
         let at_i = At::cosine(cos);
         let choice = self.choice(at_o);
         let near = at_o.of_spectra(&self.multiple.near);
-        let through = ggx.visibility(wo, wi) * cos;
+        let through = self.ggx.visibility(wo, wi) * cos;
         if wi.z > 0.0 {
             let h = halfway(wo, wi);
             let c = wo.dot(h);
-            let split = self.split(c);
-            let single = split.reflected * (ggx.d(h) * through);
+            let split = self.facet.split(c);
+            let single = split.reflected * (self.ggx.d(h) * through);
             let twice = near * at_i.of_spectra(&self.multiple.near) * self.multiple.reflected * cos;
-            let density =
-                if self.thin { ggx.reflecting_pdf(wo, h) } else { ggx.visible_pdf(wo, h) / (4.0 * c).max(1e-20) };
+            let density = if self.facet.thin {
+                self.ggx.reflecting_pdf(wo, h)
+            } else {
+                self.ggx.visible_pdf(wo, h) / (4.0 * c).max(1e-20)
+            };
             let pdf = choice * self.multiple.share * cos * FRAC_1_PI + (1.0 - choice) * density * split.probability();
-            return Valued { value: (single + twice) * self.weight, pdf: SampledSpectrum::splat(pdf) };
+            return Valued { value: (single + twice) * self.facet.weight, pdf: SampledSpectrum::splat(pdf) };
         }
         let twice = near * at_i.of_spectra(&self.multiple.far) * self.multiple.transmitted * cos;
         let diffuse = choice * (1.0 - self.multiple.share) * cos * FRAC_1_PI;
-        if self.thin {
+        if self.facet.thin {
             let mirrored = Vec3::new(wi.x, wi.y, -wi.z);
             let h = halfway(wo, mirrored);
-            let split = self.split(wo.dot(h));
-            let single = split.transmitted * (ggx.d(h) * through);
-            let pdf = diffuse + (1.0 - choice) * ggx.reflecting_pdf(wo, h) * (1.0 - split.probability());
-            return Valued { value: (single + twice) * self.weight, pdf: SampledSpectrum::splat(pdf) };
+            let split = self.facet.split(wo.dot(h));
+            let single = split.transmitted * (self.ggx.d(h) * through);
+            let pdf = diffuse + (1.0 - choice) * self.ggx.reflecting_pdf(wo, h) * (1.0 - split.probability());
+            return Valued { value: (single + twice) * self.facet.weight, pdf: SampledSpectrum::splat(pdf) };
         }
         let mut valued = Valued { value: twice, pdf: SampledSpectrum::splat(diffuse) };
-        for lane in 0..if self.uniform { 1 } else { N } {
-            let Some(facet) = Facet::transmitting(wo, wi, self.eta[lane]) else { continue };
-            let split = self.split(facet.cos_o);
+        for lane in 0..if self.facet.uniform { 1 } else { N } {
+            let Some(facet) = Facet::transmitting(wo, wi, self.facet.eta[lane]) else { continue };
+            let split = self.facet.split(facet.cos_o);
             // f_t |μ_i| = (1 − F) D G2 c_o/|μ_o| · dω_h/dω_i, with G2/(4 μ_o μ_i) in `through`.
-            let single = 4.0 * ggx.d(facet.h) * through * facet.cos_o * facet.jacobian;
-            let density = ggx.visible_pdf(wo, facet.h) * facet.jacobian * (1.0 - split.probability()) * (1.0 - choice);
-            for i in lane..if self.uniform { N } else { lane + 1 } {
+            let single = 4.0 * self.ggx.d(facet.h) * through * facet.cos_o * facet.jacobian;
+            let density =
+                self.ggx.visible_pdf(wo, facet.h) * facet.jacobian * (1.0 - split.probability()) * (1.0 - choice);
+            for i in lane..if self.facet.uniform { N } else { lane + 1 } {
                 valued.value[i] += single * split.transmitted[i];
                 valued.pdf[i] += density;
             }
         }
-        valued.value = valued.value * self.radiance() * self.weight;
+        valued.value = valued.value * self.facet.radiance() * self.facet.weight;
         valued
+    }
+}
+
+impl<const N: usize> Multiple<N> {
+    fn new(facet: &Dielectric<N>, roughness: Roughness) -> Self {
+        let quotient = |x: f32, mean: f32| if mean > 0.0 { x * FRAC_1_PI / mean } else { 0.0 };
+        if facet.thin {
+            let missing = roughness.white().map(|e| (1.0 - e).max(0.0));
+            let mean = albedo::mean(&missing);
+            let near = missing.map(SampledSpectrum::splat);
+            let split = |i| facet.split(albedo::node(i));
+            let r = albedo::mean_of_spectra(&std::array::from_fn(|i| split(i).reflected));
+            let t = albedo::mean_of_spectra(&std::array::from_fn(|i| split(i).transmitted));
+            return Self {
+                near,
+                far: near,
+                reflected: r.map(|r| quotient(r, mean)),
+                transmitted: t.map(|t| quotient(t, mean)),
+                share: Split { reflected: r, transmitted: t }.probability(),
+            };
+        }
+        let near = albedo::of_lanes(facet.eta, |eta| roughness.dielectric_loss(eta));
+        let far = albedo::of_lanes(facet.eta, |eta| roughness.dielectric_loss(1.0 / eta));
+        let (near_mean, far_mean) = (albedo::mean_of_spectra(&near), albedo::mean_of_spectra(&far));
+        let x = SampledSpectrum::<N>::from_fn(|i| {
+            let greater = near_mean[i].max(far_mean[i]);
+            if greater > 0.0 { (1.0 - fresnel::dielectric_mean(facet.eta[i])) * far_mean[i] / greater } else { 0.0 }
+        });
+        Self {
+            near,
+            far,
+            reflected: x.zip(near_mean, |x, mean| quotient(1.0 - x, mean)) * facet.color,
+            transmitted: x.zip(far_mean, quotient) * facet.tint,
+            share: 1.0 - x.mean(),
+        }
     }
 }
 

@@ -80,7 +80,7 @@ pub(super) fn conductor(cos_i: f32, n: f32, k: f32) -> f32 {
 
 /// (1 − μ)⁵.
 #[inline]
-fn schlick_rise(cos_i: f32) -> f32 {
+pub(super) fn schlick_rise(cos_i: f32) -> f32 {
     let m = (1.0 - cos_i).clamp(0.0, 1.0);
     let m2 = m * m;
     m2 * m2 * m
@@ -200,22 +200,9 @@ impl<const N: usize> Fresnel<N> {
         }
     }
 
-    /// The reflectance of one lane.
-    #[inline]
-    pub(super) fn lane(&self, cos_i: f32, lane: usize) -> f32 {
-        if self.film.is_some() {
-            return self.at(cos_i)[lane];
-        }
-        match &self.law {
-            Law::Uniform(eta) => dielectric(cos_i, *eta),
-            Law::Dielectric(eta) => dielectric(cos_i, eta[lane]),
-            _ => self.at(cos_i)[lane],
-        }
-    }
-
-    /// Whether no lane differs from another.
-    pub(super) fn is_uniform(&self) -> bool {
-        matches!(self.law, Law::Uniform(_)) && self.film.is_none()
+    /// The law where there is no film.
+    pub(super) fn bare(&self) -> Option<&Law<N>> {
+        self.film.is_none().then_some(&self.law)
     }
 }
 

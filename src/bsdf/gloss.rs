@@ -5,8 +5,8 @@
 
 use glam::Vec3;
 
-use super::albedo::{self, At, NODES, Roughness};
-use super::fresnel::Fresnel;
+use super::albedo::{self, At, Roughness, Slice};
+use super::fresnel::{Fresnel, Law};
 use super::microfacet::Ggx;
 use super::{SMOOTH_ALPHA, Slices};
 use crate::spectrum::SampledSpectrum;
@@ -28,28 +28,46 @@ pub(super) fn distribution(alpha: [f32; 2]) -> Option<Ggx> {
     (alpha[0].max(alpha[1]) >= SMOOTH_ALPHA).then(|| Ggx::new(alpha))
 }
 
+/// Directional albedo of facets with this reflectance.
+fn rough_albedo<const N: usize>(fresnel: &Fresnel<N>, roughness: Roughness) -> Slices<N> {
+    match fresnel.bare() {
+        Some(Law::Uniform(eta)) => roughness.dielectric(*eta).map(SampledSpectrum::splat),
+        Some(Law::Dielectric(eta)) => albedo::of_lanes(*eta, |eta| roughness.dielectric(eta)),
+        Some(Law::Schlick(f0)) => {
+            let (rise, white) = (roughness.rise(), roughness.white());
+            std::array::from_fn(|i| f0.map(|f0| f0 * (white[i] - rise[i]) + rise[i]))
+        }
+        _ => roughness.facing_of_spectra(&std::array::from_fn(|i| fresnel.at(albedo::node(i)))),
+    }
+}
+
 impl<const N: usize> Gloss<N> {
     pub(super) fn new(weight: f32, fresnel: Fresnel<N>, alpha: [f32; 2], color: SampledSpectrum<N>) -> Self {
         let ggx = distribution(alpha);
-        let albedo = match (&ggx, fresnel.is_uniform()) {
-            (None, _) => std::array::from_fn(|i| fresnel.at(albedo::node(i))),
-            (Some(ggx), true) => {
-                let reflectance = std::array::from_fn(|i| fresnel.lane(albedo::node(i), 0));
-                Roughness::new(ggx.mean_alpha()).facing(&reflectance).map(SampledSpectrum::splat)
-            }
-            (Some(ggx), false) => {
-                let reflectance: [_; NODES] = std::array::from_fn(|i| fresnel.at(albedo::node(i)));
-                Roughness::new(ggx.mean_alpha()).facing_of_spectra(&reflectance)
-            }
+        let albedo = match &ggx {
+            None => std::array::from_fn(|i| fresnel.at(albedo::node(i))),
+            Some(ggx) => rough_albedo(&fresnel, Roughness::new(ggx.mean_alpha())),
         };
         Self { weight, fresnel, ggx, albedo, color }
     }
 
     /// What it leaves of the transmittance of the layers over it.
     ///
-    /// It reflects T(μ_o) f T(μ_i), of which T² E is the albedo: exact where it is smooth or nothing is over it.
-    pub(super) fn below(&self, above: f32, node: usize) -> SampledSpectrum<N> {
-        self.albedo[node].map(|e| (above - self.weight * e * above * above).max(0.0))
+    /// It reflects f √(T(μ_o) T(μ_i)): T E where it is smooth. Over a rough lobe the mean of √T is needed, weighted by F. Facets that reflect
+    /// much are seen at grazing angles, and send light to grazing angles, where T falls; so of the mean over the lobe of white facets
+    /// and √T(μ) itself the latter counts for a quarter, which fits integration best. What is off then stands in docs/scattering.md.
+    pub(super) fn below(&self, above: Option<&Slice>) -> Slices<N> {
+        let Some(above) = above else { return self.albedo.map(|e| e.map(|e| (1.0 - self.weight * e).max(0.0))) };
+        let root = above.map(f32::sqrt);
+        let back: Slice = match &self.ggx {
+            None => root,
+            Some(ggx) => {
+                let roughness = Roughness::new(ggx.mean_alpha());
+                let (leaving, white) = (roughness.leaving(&root), roughness.white());
+                std::array::from_fn(|i| 0.25 * root[i] + 0.75 * leaving[i] / white[i].max(1e-6))
+            }
+        };
+        std::array::from_fn(|i| self.albedo[i].map(|e| (above[i] - self.weight * e * root[i] * back[i]).max(0.0)))
     }
 
     /// f cos θ_i of the rough interface, without the layers over it.

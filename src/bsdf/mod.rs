@@ -24,7 +24,9 @@ use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
 use crate::spectrum::SampledSpectrum;
+use dielectric::Dielectric;
 use diffuse::{Diffuse, sample_cosine};
+use fresnel::Fresnel;
 use stack::Stack;
 
 pub use parameters::{Coat, Film, Interface, Metal, Parameters, SMOOTH_ALPHA, Sheen};
@@ -114,6 +116,10 @@ pub struct Bsdf<const N: usize> {
 enum Kind<const N: usize> {
     /// Nothing but diffuse reflection.
     Diffuse(Diffuse<N>),
+    /// A smooth metal.
+    Mirror(Fresnel<N>),
+    /// A smooth interface that light passes.
+    Clear(Dielectric<N>),
     /// Anything.
     Stack(Stack<N>),
 }
@@ -121,24 +127,27 @@ enum Kind<const N: usize> {
 impl<const N: usize> Bsdf<N> {
     /// Of what the surface is made of there.
     pub fn new(parameters: &Parameters<N>) -> Self {
-        let bare = parameters.specular_weight <= 0.0
-            && parameters.metalness <= 0.0
-            && parameters.transmission <= 0.0
-            && parameters.coat.is_none()
-            && parameters.sheen.is_none()
-            && parameters.diffuse_transmission.is_black();
-        let kind = if bare {
-            Kind::Diffuse(Diffuse::new(parameters.base_color, parameters.diffuse_roughness))
-        } else {
-            Kind::Stack(Stack::new(parameters))
-        };
-        Self { kind }
+        let bare = parameters.coat.is_none() && parameters.sheen.is_none();
+        let opaque = parameters.metalness <= 0.0 && parameters.transmission <= 0.0;
+        // Returned from where they are made: moving a BSDF costs more than making a short one.
+        if bare && opaque && parameters.specular_weight <= 0.0 && parameters.diffuse_transmission.is_black() {
+            return Self { kind: Kind::Diffuse(Diffuse::new(parameters.base_color, parameters.diffuse_roughness)) };
+        }
+        let smooth = parameters.alpha[0].max(parameters.alpha[1]) < SMOOTH_ALPHA;
+        if bare && smooth && parameters.metalness >= 1.0 {
+            return Self { kind: Kind::Mirror(Fresnel::of_metal(parameters)) };
+        }
+        if bare && smooth && parameters.metalness <= 0.0 && parameters.transmission >= 1.0 {
+            return Self { kind: Kind::Clear(Dielectric::new(parameters, stack::ratio(parameters), 1.0)) };
+        }
+        Self { kind: Kind::Stack(Stack::new(parameters)) }
     }
 
     /// Whether every lobe is smooth: then light sampling has nothing to add.
     pub fn is_smooth(&self) -> bool {
         match &self.kind {
             Kind::Diffuse(_) => false,
+            Kind::Mirror(_) | Kind::Clear(_) => true,
             Kind::Stack(stack) => stack.is_smooth(),
         }
     }
@@ -151,6 +160,16 @@ impl<const N: usize> Bsdf<N> {
         }
         let diffuse = match &self.kind {
             Kind::Diffuse(diffuse) => diffuse,
+            Kind::Mirror(fresnel) => {
+                return Some(BsdfSample {
+                    scattered: Scattered::Mirror,
+                    event: Event::SpecularReflection,
+                    weight: fresnel.at(wo.z),
+                    diffuse: SampledSpectrum::ZERO,
+                    pdf: SampledSpectrum::ONE,
+                });
+            }
+            Kind::Clear(facet) => return facet.sample(wo.z, u_lobe, 1.0, SampledSpectrum::ONE),
             Kind::Stack(stack) => return stack.sample(wo, u_lobe, u),
         };
         let wi = sample_cosine(u);
@@ -174,6 +193,7 @@ impl<const N: usize> Bsdf<N> {
             return Evaluated::NOTHING;
         }
         match &self.kind {
+            Kind::Mirror(_) | Kind::Clear(_) => Evaluated::NOTHING,
             Kind::Diffuse(_) if wi.z <= 0.0 => Evaluated::NOTHING,
             Kind::Diffuse(diffuse) => Evaluated {
                 diffuse: diffuse.evaluate(wo, wi),

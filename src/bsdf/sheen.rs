@@ -2,17 +2,13 @@
 //!
 //! "Charlie" of A. Conty Estevez & C. Kulla, "Production friendly microfacet sheen BRDF", SIGGRAPH 2017:
 //! D(h) = (2 + 1/r) sin^{1/r} θ_h / (2π), f = D G / (4 μ_o μ_i), G = 1/(1 + Λ(μ_o) + Λ(μ_i)), with their fit of Λ. Its albedo
-//! is tabulated over (μ, r); what sheen does not reflect, 1 − w E(μ), goes on to what is below (as OpenPBR has it, whatever the colour).
+//! is tabulated ([`super::albedo`]); what sheen does not reflect, 1 − w E(μ), goes on to what is below (as OpenPBR has it, whatever the colour).
 
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI};
-use std::sync::OnceLock;
 
-use super::albedo::{self, At, NODES, Slice};
+use super::albedo::{self, At, Slice};
 use crate::spectrum::SampledSpectrum;
-
-/// Roughness below which the fit of Λ was not made; smaller ones are this.
-const SHARPEST: f32 = 0.07;
 
 /// A sheen lobe.
 #[derive(Clone, Copy, Debug)]
@@ -26,12 +22,12 @@ pub(super) struct SheenLobe<const N: usize> {
 
 impl<const N: usize> SheenLobe<N> {
     pub(super) fn new(sheen: &super::Sheen<N>) -> Self {
-        let roughness = sheen.roughness.clamp(SHARPEST, 1.0);
+        let roughness = sheen.roughness.clamp(albedo::SHARPEST_SHEEN, 1.0);
         Self {
             weight: sheen.weight.clamp(0.0, 1.0),
             color: sheen.color,
             shape: Shape::new(roughness),
-            albedo: albedo(roughness),
+            albedo: albedo::sheen(roughness),
         }
     }
 
@@ -50,7 +46,7 @@ impl<const N: usize> SheenLobe<N> {
 
 /// The distribution of a roughness with its masking.
 #[derive(Clone, Copy, Debug)]
-struct Shape {
+pub(super) struct Shape {
     inverse: f32,
     a: f32,
     b: f32,
@@ -62,7 +58,7 @@ struct Shape {
 }
 
 impl Shape {
-    fn new(roughness: f32) -> Self {
+    pub(super) fn new(roughness: f32) -> Self {
         let t = (1.0 - roughness) * (1.0 - roughness);
         let mix = |rough: f32, smooth: f32| rough + (smooth - rough) * t;
         let mut shape = Self {
@@ -91,52 +87,12 @@ impl Shape {
     }
 
     /// f, 1/sr.
-    fn value(&self, mu_o: f32, mu_i: f32, mu_h: f32) -> f32 {
+    pub(super) fn value(&self, mu_o: f32, mu_i: f32, mu_h: f32) -> f32 {
         let sine = (1.0 - mu_h * mu_h).max(0.0).sqrt();
         let d = (2.0 + self.inverse) * libm::powf(sine, self.inverse) / (2.0 * PI);
         let denominator = 4.0 * mu_o * mu_i * (1.0 + self.lambda(mu_o) + self.lambda(mu_i));
         if denominator > 0.0 { d / denominator } else { 0.0 }
     }
-}
-
-/// Roughnesses of the table, evenly spaced from [`SHARPEST`] to 1.
-const ROUGHNESSES: usize = 16;
-
-/// Directional albedo at the nodes: linear between the roughnesses of the table.
-fn albedo(roughness: f32) -> Slice {
-    static TABLE: OnceLock<[Slice; ROUGHNESSES]> = OnceLock::new();
-    let table = TABLE.get_or_init(|| {
-        std::array::from_fn(|k| {
-            let shape = Shape::new(SHARPEST + (1.0 - SHARPEST) * k as f32 / (ROUGHNESSES - 1) as f32);
-            std::array::from_fn(|i| integrate(&shape, albedo::node(i)))
-        })
-    });
-    let x = (roughness - SHARPEST) / (1.0 - SHARPEST) * (ROUGHNESSES - 1) as f32;
-    let k = (x as usize).min(ROUGHNESSES - 2);
-    let f = x - k as f32;
-    std::array::from_fn::<_, NODES, _>(|i| table[k][i] * (1.0 - f) + table[k + 1][i] * f)
-}
-
-/// ∫ f μ_i dω_i by the midpoint rule, over t = √μ_i and half of the azimuths.
-fn integrate(shape: &Shape, mu_o: f32) -> f32 {
-    const COSINES: usize = 48;
-    const AZIMUTHS: usize = 48;
-    let mu_o = mu_o.max(1e-4);
-    let sine_o = (1.0 - mu_o * mu_o).sqrt();
-    let mut sum = 0.0;
-    for j in 0..COSINES {
-        let t = (j as f32 + 0.5) / COSINES as f32;
-        let mu_i = t * t;
-        let sine_i = (1.0 - mu_i * mu_i).sqrt();
-        let mut ring = 0.0;
-        for k in 0..AZIMUTHS {
-            let phi = PI * (k as f32 + 0.5) / AZIMUTHS as f32;
-            let h = Vec3::new(sine_o + sine_i * libm::cosf(phi), sine_i * libm::sinf(phi), mu_o + mu_i);
-            ring += f64::from(shape.value(mu_o, mu_i, h.z / h.length()));
-        }
-        sum += ring * f64::from(mu_i * 2.0 * t);
-    }
-    (sum * 2.0 * std::f64::consts::PI / (COSINES * AZIMUTHS) as f64) as f32
 }
 
 /// Density per solid angle with which sheen is drawn: a cosine, since it is broad.

@@ -1,7 +1,7 @@
 //! Layers: sheen over coat over a base that is metal, plastic and glass in shares.
 //!
 //! Light that a layer does not send back reaches the next one; the last opaque one sends back the rest, reciprocally. With T(μ)
-//! the part that passes all layers above, in and out, a layer's lobe is T(μ_o) f T(μ_i), and leaves T − (its albedo) to
+//! the part that passes all layers above, in and out, an interface's lobe is f √(T(μ_o) T(μ_i)), and leaves T − (its albedo) to
 //! the next. The diffuse base, of directional transmittance D, is ρ D(μ_o) D(μ_i) / (π D_avg): a white one sends back D(μ_o). So a stack of
 //! lossless layers is lossless.
 //!
@@ -14,7 +14,7 @@ use std::f32::consts::FRAC_1_PI;
 use super::albedo::{self, At, NODES, Slice};
 use super::coat::CoatLobe;
 use super::conductor::{Conductor, Pair, darkening};
-use super::dielectric::{Glass, halfway};
+use super::dielectric::{Dielectric, RoughDielectric, halfway};
 use super::diffuse::{self, OrenNayar};
 use super::fresnel::{self, Fresnel};
 use super::gloss::Gloss;
@@ -36,6 +36,14 @@ pub(super) struct Stack<const N: usize> {
     gloss: Option<Gloss<N>>,
     base: Option<Base<N>>,
     glass: Option<Glass<N>>,
+}
+
+/// What transmits: smooth, or by its facets.
+#[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant, reason = "part of a BSDF, which lives on the stack of one path vertex")]
+enum Glass<const N: usize> {
+    Smooth(Dielectric<N>),
+    Rough(RoughDielectric<N>),
 }
 
 /// The diffuse base under its interface.
@@ -77,10 +85,7 @@ impl<const N: usize> Stack<N> {
         let coat = parameters.coat.as_ref().filter(|c| c.weight > 0.0).map(|c| CoatLobe::new(c, &parameters.interface));
         let below_coat = match &coat {
             None => below_sheen,
-            Some(coat) => {
-                let above = below_sheen.unwrap_or([1.0; NODES]);
-                Some(std::array::from_fn(|i| coat.gloss.below(above[i], i)[0]))
-            }
+            Some(coat) => Some(coat.gloss.below(below_sheen.as_ref()).map(|passed| passed[0])),
         };
 
         let metalness = parameters.metalness.clamp(0.0, 1.0);
@@ -88,7 +93,10 @@ impl<const N: usize> Stack<N> {
         let metal = (metalness > 0.0).then(|| Conductor::new(parameters, metalness, below_coat.as_ref()));
         let eta = ratio(parameters);
         let share = (1.0 - metalness) * transmission;
-        let glass = (share > 0.0).then(|| Glass::new(parameters, eta, share));
+        let glass = (share > 0.0).then(|| {
+            let facet = Dielectric::new(parameters, eta, share);
+            RoughDielectric::new(&facet, parameters.alpha).map_or(Glass::Smooth(facet), Glass::Rough)
+        });
         let share = (1.0 - metalness) * (1.0 - transmission);
         let (mut gloss, mut base) = (None, None);
         if share > 0.0 {
@@ -100,11 +108,10 @@ impl<const N: usize> Stack<N> {
             let bare = parameters.specular_weight <= 0.0
                 || (parameters.schlick_f0.is_none() && parameters.film.is_none() && is_matched(eta));
             gloss = (!bare).then(|| Gloss::new(1.0, fresnel, parameters.alpha, parameters.specular_color));
-            let above = below_coat.unwrap_or([1.0; NODES]);
-            let reached = std::array::from_fn(|i| match &gloss {
-                None => SampledSpectrum::splat(above[i]),
-                Some(gloss) => gloss.below(above[i], i),
-            });
+            let reached = match &gloss {
+                None => below_coat.unwrap_or([1.0; NODES]).map(SampledSpectrum::splat),
+                Some(gloss) => gloss.below(below_coat.as_ref()),
+            };
             base = Base::new(parameters, share, reached);
             if let Some(gloss) = &mut gloss {
                 gloss.weight = share;
@@ -120,7 +127,7 @@ impl<const N: usize> Stack<N> {
             && self.coat.is_none_or(|coat| coat.gloss.ggx.is_none())
             && self.metal.is_none_or(|metal| metal.rough.is_none())
             && self.gloss.is_none_or(|gloss| gloss.ggx.is_none())
-            && self.glass.is_none_or(|glass| glass.ggx.is_none())
+            && self.glass.is_none_or(|glass| matches!(glass, Glass::Smooth(_)))
     }
 
     /// Probabilities of the lobes.
@@ -143,7 +150,11 @@ impl<const N: usize> Stack<N> {
             p[BASE] = ((base.reflected + base.transmitted) * view.at.of_spectra(&base.reached)).mean() * view.absorbed;
         }
         if let Some(glass) = &self.glass {
-            p[GLASS] = glass.weight * through;
+            let weight = match glass {
+                Glass::Smooth(facet) => facet.weight,
+                Glass::Rough(rough) => rough.weight(),
+            };
+            p[GLASS] = weight * through;
         }
         let p = p.map(|p| p.max(0.0));
         let sum: f32 = p.iter().sum();
@@ -184,8 +195,9 @@ impl<const N: usize> Stack<N> {
                 let gloss = &self.coat.as_ref()?.gloss;
                 match gloss.ggx {
                     None => {
-                        let passed = gloss.weight * view.below_sheen * view.below_sheen;
-                        return mirrored(gloss.fresnel.at(wo.z) * passed);
+                        return mirrored(SampledSpectrum::splat(
+                            gloss.fresnel.at(wo.z)[0] * gloss.weight * view.below_sheen,
+                        ));
                     }
                     Some(ggx) => (off(ggx), Event::GlossyReflection),
                 }
@@ -202,7 +214,7 @@ impl<const N: usize> Stack<N> {
                 match gloss.ggx {
                     None => {
                         let value = gloss.fresnel.at(wo.z) * gloss.color * gloss.weight;
-                        return mirrored(value * through * view.below_coat);
+                        return mirrored(value * through);
                     }
                     Some(ggx) => (off(ggx), Event::GlossyReflection),
                 }
@@ -212,26 +224,13 @@ impl<const N: usize> Stack<N> {
                 let below = rest >= self.base.as_ref()?.share();
                 (if below { Vec3::new(wi.x, wi.y, -wi.z) } else { wi }, Event::Diffuse)
             }
-            _ => {
-                let glass = self.glass.as_ref()?;
-                match &glass.ggx {
-                    None => {
-                        let branch = glass.branch(wo.z, rest)?;
-                        let probability = chosen * branch.probability;
-                        return Some(BsdfSample {
-                            scattered: branch.scattered,
-                            event: branch.event,
-                            weight: branch.value * through * (1.0 / probability),
-                            diffuse: SampledSpectrum::ZERO,
-                            pdf: SampledSpectrum::splat(probability),
-                        });
-                    }
-                    Some(ggx) => {
-                        let wi = glass.sample(ggx, wo, &view.at, rest, u)?;
-                        (wi, if wi.z > 0.0 { Event::GlossyReflection } else { Event::GlossyTransmission })
-                    }
+            _ => match self.glass.as_ref()? {
+                Glass::Smooth(facet) => return facet.sample(wo.z, rest, chosen, through),
+                Glass::Rough(rough) => {
+                    let wi = rough.sample(wo, &view.at, rest, u)?;
+                    (wi, if wi.z > 0.0 { Event::GlossyReflection } else { Event::GlossyTransmission })
                 }
-            }
+            },
         };
         let evaluated = self.evaluate_from(&view, &choices, wo, wi);
         let pdf = evaluated.pdf.hero();
@@ -275,7 +274,8 @@ impl<const N: usize> Stack<N> {
                 pdf += choices[SHEEN] * sheen::pdf(wi);
             }
             if let Some((gloss, ggx)) = self.coat.as_ref().and_then(|c| Some((&c.gloss, c.gloss.ggx.as_ref()?))) {
-                evaluated.glossy += gloss.evaluate(ggx, wo, wi, pair.h) * below_sheen;
+                let value = gloss.evaluate(ggx, wo, wi, pair.h)[0] * below_sheen.sqrt();
+                evaluated.glossy += SampledSpectrum::splat(value);
                 pdf += choices[COAT] * ggx.reflecting_pdf(wo, pair.h);
             }
             if let Some((metal, rough)) = self.metal.as_ref().and_then(|m| Some((m, m.rough.as_ref()?))) {
@@ -283,7 +283,7 @@ impl<const N: usize> Stack<N> {
                 pdf += choices[METAL] * rough.pdf(&pair, view.below_coat);
             }
             if let Some((gloss, ggx)) = self.gloss.as_ref().and_then(|g| Some((g, g.ggx.as_ref()?))) {
-                evaluated.glossy += gloss.evaluate(ggx, wo, wi, pair.h) * absorption * below_coat;
+                evaluated.glossy += gloss.evaluate(ggx, wo, wi, pair.h) * absorption * below_coat.sqrt();
                 pdf += choices[GLOSS] * ggx.reflecting_pdf(wo, pair.h);
             }
             if let Some(base) = &self.base {
@@ -295,8 +295,8 @@ impl<const N: usize> Stack<N> {
             pdf += choices[BASE] * (1.0 - base.share()) * -wi.z * FRAC_1_PI;
         }
         evaluated.pdf = SampledSpectrum::splat(pdf);
-        if let Some((glass, ggx)) = self.glass.as_ref().and_then(|g| Some((g, g.ggx.as_ref()?))) {
-            let valued = glass.evaluate(ggx, wo, wi, &view.at);
+        if let Some(Glass::Rough(rough)) = &self.glass {
+            let valued = rough.evaluate(wo, wi, &view.at);
             // Reciprocal for what is reflected; what is transmitted does not know the other side's layers.
             let through = match (wi.z > 0.0, &self.below_coat) {
                 (_, None) => 1.0,

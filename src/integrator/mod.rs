@@ -147,6 +147,10 @@ pub trait Integrator: Send + Sync {
     fn summary(&self) -> &str;
     /// The AOVs it offers.
     fn aovs(&self) -> Vec<&'static Aov>;
+    /// Whether it computes light: its samples are then many unless told otherwise, and spread by the pixel filter.
+    fn transports_light(&self) -> bool {
+        false
+    }
     /// What it needs for `aovs`, in a scene where something disperses or nothing does.
     fn needs(&self, aovs: &[&Aov], is_dispersive: bool) -> Needs {
         Needs::of(aovs, is_dispersive)

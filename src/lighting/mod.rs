@@ -324,6 +324,8 @@ impl<'a> Lighting<'a> {
         let hit = hit_at(object.instance, primitive, barycentric);
         let lights = (&self.lights[..], &self.colors[..]);
         let radiance = self.objects.radiance(self.view, lights, object, &hit, -wi, wavelengths);
+        // Rays meet no more of it than is there.
+        let radiance = radiance * object.presence(self.view, &hit);
         let light = self.id_of(object.source, &hit);
         let sample =
             LightSample { light, wi, distance, radiance, pdf: (probability * pdf_solid_angle) as f32, is_delta: false };

@@ -9,12 +9,13 @@
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
-use super::color::{Color, Filter};
+use super::color::Color;
 use super::shape::{Ellipsoid, Rectangle, Triangle};
 use crate::diagnostics::Diagnostics;
 use crate::geometry::{Hit, Shape, Solid};
 use crate::light::{Ellipsoid as WorldEllipsoid, Light, MaterialSync, Shape as LightShape, White};
-use crate::scene::view::{Presence, View};
+use crate::scene::view::View;
+use crate::spectrum::reflectance::Unbounded;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
 
 /// More pieces than this are not sampled: a gigabyte of them.
@@ -89,11 +90,9 @@ impl Objects {
         mut add: impl FnMut(u32, &Object, &NewPiece) -> u32,
     ) -> Self {
         let scene = view.scene;
-        let emission = |material: &crate::scene::material::Material| {
-            let [r, g, b, _] = material.appearance.emission.as_ref()?.as_constant()?;
-            Some(Color::over_d65([r, g, b].map(|x| f64::from(x.max(0.0)))))
-        };
-        let mut all = Self { list: Vec::new(), colors: scene.materials.iter().map(emission).collect() };
+        let constants = scene.materials.iter().map(|material| material.surface.constant_emission());
+        let color = |rgb: Option<[f32; 3]>| rgb.map(|rgb| Color::over_d65(rgb.map(f64::from)));
+        let mut all = Self { list: Vec::new(), colors: constants.map(color).collect() };
         let mut of_prim: Vec<(u32, u32, MaterialSync, bool)> = Vec::new();
         for (light, index) in lights.iter().zip(0..) {
             if let LightShape::Geometry(geometry) = &light.shape {
@@ -104,7 +103,7 @@ impl Objects {
         // Of several lights of a prim the first.
         of_prim.sort_by_key(|&(prim, light, ..)| (prim, light));
         of_prim.dedup_by_key(|entry| entry.0);
-        let emits: Vec<bool> = scene.materials.iter().map(|m| m.appearance.emission.is_some()).collect();
+        let emits: Vec<bool> = scene.materials.iter().map(|material| material.surface.emits()).collect();
         if of_prim.is_empty() && !emits.contains(&true) {
             return all;
         }
@@ -187,7 +186,7 @@ impl Objects {
                 let values = probes.iter().filter_map(|&place| {
                     let hit = hit_at(object.instance, primitive, place);
                     let glow = view.emission(&hit, view.material_id(&hit))?;
-                    Some(mean(std::array::from_fn(|i| base[i] * glow[i])))
+                    Some(mean(std::array::from_fn(|i| base[i] * f64::from(glow[i]))))
                 });
                 let values: Vec<f64> = values.collect();
                 if values.is_empty() { return None } else { values.iter().sum::<f64>() / values.len() as f64 }
@@ -220,12 +219,13 @@ impl Objects {
         if let Some(color) = &self.colors[material] {
             return Some(color.at(wavelengths));
         }
-        let filter = Filter::of(view.emission(hit, id)?);
+        let filter = Unbounded::of_color(view.emission(hit, id)?);
         let white = White::d65();
         Some(SampledSpectrum(wavelengths.nanometers().map(|nm| white.at(nm))) * filter.at(wavelengths))
     }
 
-    /// What an object emits at `hit` in the direction of travel `direction`, as what is sampled of it does.
+    /// What an object emits at `hit` in the direction of travel `direction`, as what is sampled of it does; where its surface is
+    /// only there in part, as the part that is there does.
     pub(super) fn radiance<const N: usize>(
         &self,
         view: &View<'_>,
@@ -236,21 +236,14 @@ impl Objects {
         wavelengths: &Wavelengths<N>,
     ) -> SampledSpectrum<N> {
         let id = view.material_id(hit);
-        let is_absent = || view.presence(hit, id) == Presence::Absent;
         match object.source {
-            Source::Material => {
-                let glow = self.glow(view, hit, id, wavelengths).filter(|_| !is_absent());
-                glow.unwrap_or(SampledSpectrum::ZERO)
-            }
+            Source::Material => self.glow(view, hit, id, wavelengths).unwrap_or(SampledSpectrum::ZERO),
             Source::Light { light, sync, scale } => {
                 let (light, color) = (&lights.0[light as usize], &lights.1[light as usize]);
                 let mut factor = light.shaped(direction).map(|x| scale * x);
-                if sync != MaterialSync::NoResponse && is_absent() {
-                    return SampledSpectrum::ZERO;
-                }
                 if sync == MaterialSync::GlowTintsLight {
                     let Some(glow) = view.emission(hit, id) else { return SampledSpectrum::ZERO };
-                    factor = std::array::from_fn(|i| factor[i] * glow[i]);
+                    factor = std::array::from_fn(|i| factor[i] * f64::from(glow[i]));
                 }
                 color.times(factor, wavelengths)
             }
@@ -259,6 +252,14 @@ impl Objects {
 }
 
 impl Object {
+    /// The share of its surface that is there at `hit`.
+    pub(super) fn presence(&self, view: &View<'_>, hit: &Hit) -> f32 {
+        match self.source {
+            Source::Light { sync: MaterialSync::NoResponse, .. } => 1.0,
+            _ => view.share_present(hit, view.material_id(hit)),
+        }
+    }
+
     /// Whether it shines to both sides.
     pub(super) fn is_two_sided(&self) -> bool {
         self.source == Source::Material

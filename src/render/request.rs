@@ -14,8 +14,18 @@ pub struct Request {
     pub width: Option<u32>,
     /// Pixels; alone, it keeps the authored aspect.
     pub height: Option<u32>,
-    /// Samples per pixel.
+    /// Samples per pixel; the most of them if there is an error target.
     pub samples: Option<u32>,
+    /// Relative error at which a pixel gets no more samples; 0 for none.
+    pub error_target: Option<f64>,
+    /// Seconds after which the image is finished with the samples that it has; 0 for none.
+    pub time_limit: Option<f64>,
+    /// The most that a sample of the beauty may have in R, G, B; no limit if absent.
+    pub clamp: Option<f64>,
+    /// Name of the reconstruction filter of light.
+    pub pixel_filter: Option<String>,
+    /// Its full width, pixels.
+    pub pixel_filter_width: Option<f64>,
     /// Whether samples are spread over the lens; as the stage says if absent.
     pub depth_of_field: Option<bool>,
     /// Name of an integrator.

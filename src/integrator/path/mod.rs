@@ -39,6 +39,10 @@ impl Integrator for Path {
         AOVS.iter().collect()
     }
 
+    fn transports_light(&self) -> bool {
+        true
+    }
+
     fn prepare<'a>(&self, task: &'a Task<'a>) -> Result<Box<dyn PreparedIntegrator + 'a>> {
         Ok(Box::new(Prepared::new(task)?))
     }

@@ -42,6 +42,11 @@ impl Dialect for AbbeGlass {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         Ok(Response::Transmissive {
             why: "AbbeGlass".to_owned(),

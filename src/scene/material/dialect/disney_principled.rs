@@ -45,6 +45,20 @@ impl Dialect for DisneyPrincipled {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[
+            Declared::Color(BASE_COLOR),
+            Declared::Number(SPECULAR),
+            Declared::Number(SPECULAR_TINT),
+            Declared::Number(ANISOTROPIC),
+            Declared::Number(SHEEN),
+            Declared::Number(SHEEN_TINT),
+            Declared::Number(CLEARCOAT),
+            Declared::Number(CLEARCOAT_GLOSS),
+        ]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         layered::layered(
             inputs,

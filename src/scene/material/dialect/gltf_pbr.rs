@@ -68,6 +68,26 @@ impl Dialect for GltfPbr {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[
+            Declared::Color(BASE_COLOR),
+            Declared::Number(SPECULAR),
+            Declared::Color(SPECULAR_COLOR),
+            Declared::Number(IRIDESCENCE),
+            Declared::Number(IRIDESCENCE_IOR),
+            Declared::Number(IRIDESCENCE_THICKNESS),
+            Declared::Color(SHEEN_COLOR),
+            Declared::Number(SHEEN_ROUGHNESS),
+            Declared::Number(CLEARCOAT),
+            Declared::Number(CLEARCOAT_ROUGHNESS),
+            Declared::Color(EMISSIVE),
+            Declared::Number(EMISSIVE_STRENGTH),
+            Declared::Number(ANISOTROPY_STRENGTH),
+            Declared::Number(ANISOTROPY_ROTATION),
+        ]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         if let Some(limit) = limit(inputs, diagnostics)?
             && !inputs.is_looked_up(ALPHA.name)

@@ -49,6 +49,16 @@ impl Dialect for LamaDielectric {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[
+            Declared::Color(REFLECTION_TINT),
+            Declared::Color(TRANSMISSION_TINT),
+            Declared::Number(ANISOTROPY),
+            Declared::Number(ROTATION),
+        ]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         let rough = inputs.is_rough(ROUGHNESS, diagnostics)?;
         Ok(Response::Transmissive { why: "LamaDielectric".to_owned(), rough, thin_walled: false })

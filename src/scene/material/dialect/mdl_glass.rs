@@ -2,7 +2,8 @@
 //!
 //! Names, defaults and formulas: `nvidia/core_definitions.mdl` (as in `pablode/gatling` `src/gi/mdl/`), `thick_glass_v2`,
 //! `thin_glass_v2` and their deprecated forerunners with the same inputs. The Abbe number is itself, 0 is off. The volume
-//! colour is reached after `base_thickness` metres; the transmission colour tints the surface.
+//! colour is reached after `base_thickness` metres; the transmission colour tints the surface, of a pane the glass
+//! colour.
 
 use crate::diagnostics::Diagnostics;
 use crate::error::Result;
@@ -44,6 +45,11 @@ impl Dialect for ThickGlass {
             Declared::Color(COLOR),
             Declared::Number(THICKNESS),
         ]
+    }
+
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[Declared::Color(TRANSMISSION_COLOR)]
     }
 
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
@@ -92,6 +98,11 @@ impl Dialect for ThinGlass {
         &[Declared::Number(ROUGHNESS), Declared::Number(IOR)]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[Declared::Color(COLOR)]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         let rough = inputs.is_rough(ROUGHNESS, diagnostics)?;
         Ok(Response::Transmissive { why: "thin glass".to_owned(), rough, thin_walled: true })
@@ -102,7 +113,7 @@ impl Dialect for ThinGlass {
         Ok(Layers {
             alpha: isotropic(roughness, p)?,
             transmission: p.constant(1.0)?,
-            transmission_tint: p.color(TRANSMISSION_COLOR)?,
+            transmission_tint: p.color(COLOR)?,
             thin_walled: true,
             ..Layers::plastic(white, ior, p)?
         })

@@ -50,6 +50,10 @@ trait Dialect: Sync {
     #[cfg(test)]
     fn inputs(&self) -> &'static [Declared];
 
+    /// Every other input that light transport reads.
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared];
+
     /// What the surface does to light.
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response>;
 
@@ -92,6 +96,12 @@ const DIALECTS: &[&dyn Dialect] = &[
     &lama_dielectric::LamaDielectric,
     &pxr_surface::PxrSurface,
 ];
+
+/// Every shader identifier that is understood.
+#[cfg(test)]
+pub(super) fn every_id() -> impl Iterator<Item = &'static str> {
+    DIALECTS.iter().flat_map(|dialect| dialect.ids()).copied()
+}
 
 /// A shader whose dialect is understood.
 pub(super) struct Terminal<'a> {

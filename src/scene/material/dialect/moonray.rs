@@ -70,6 +70,11 @@ impl Dialect for DwaRefractive {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[Declared::Color(TRANSMISSION_COLOR)]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         if let Some(why) = inputs.cut_out(PRESENCE, diagnostics)? {
             return Ok(Response::CutOut(why));
@@ -135,6 +140,18 @@ impl Dialect for DwaBase {
             Declared::Switch(USE_DISPERSION),
             Declared::Number(ABBE_NUMBER),
             Declared::Integer(PRIORITY),
+        ]
+    }
+
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[
+            Declared::Color(TRANSMISSION_COLOR),
+            Declared::Color(ALBEDO),
+            Declared::Number(DIFFUSE_ROUGHNESS),
+            Declared::Color(METALLIC_COLOR),
+            Declared::Color(METALLIC_EDGE_COLOR),
+            Declared::Number(SPECULAR),
         ]
     }
 

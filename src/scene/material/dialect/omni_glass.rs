@@ -47,6 +47,11 @@ impl Dialect for OmniGlass {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[Declared::Color(COLOR), Declared::Color(REFLECTION_COLOR)]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         let opacity = inputs.weight(OPACITY, diagnostics)?;
         if inputs.switch(ENABLE_OPACITY, diagnostics)? {

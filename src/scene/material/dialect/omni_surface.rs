@@ -9,7 +9,7 @@ use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 
 use super::super::painter::{Painted, Painter};
-use super::super::surface::{CoatLayer, Layers, MetalLayer, SheenLayer, isotropic, surface_tint};
+use super::super::surface::{CoatLayer, FilmLayer, Layers, MetalLayer, SheenLayer, isotropic, surface_tint};
 use super::super::{Context, THRESHOLD};
 use super::Dialect;
 #[cfg(test)]
@@ -42,6 +42,9 @@ const COAT_WEIGHT: Number = input("coat_weight", 0.0);
 const COAT_COLOR: Color = input("coat_color", [1.0; 3]);
 const COAT_ROUGHNESS: Number = input("coat_roughness", 0.1);
 const COAT_IOR: Number = input("coat_ior", 1.5);
+const ENABLE_FILM: Switch = input("enable_thin_film", false);
+const FILM_THICKNESS: Number = input("thin_film_thickness", 400.0);
+const FILM_IOR: Number = input("thin_film_ior", 1.52);
 const SHEEN_WEIGHT: Number = input("specular_retro_reflection_weight", 0.0);
 const SHEEN_COLOR: Color = input("specular_retro_reflection_color", [1.0; 3]);
 const SHEEN_ROUGHNESS: Number = input("specular_retro_reflection_roughness", 0.3);
@@ -107,6 +110,27 @@ impl Dialect for OmniSurface {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[
+            Declared::Number(DIFFUSE_WEIGHT),
+            Declared::Color(DIFFUSE_COLOR),
+            Declared::Number(DIFFUSE_ROUGHNESS),
+            Declared::Number(SPECULAR_WEIGHT),
+            Declared::Color(SPECULAR_COLOR),
+            Declared::Number(COAT_WEIGHT),
+            Declared::Color(COAT_COLOR),
+            Declared::Number(COAT_ROUGHNESS),
+            Declared::Number(COAT_IOR),
+            Declared::Number(SHEEN_WEIGHT),
+            Declared::Color(SHEEN_COLOR),
+            Declared::Number(SHEEN_ROUGHNESS),
+            Declared::Switch(ENABLE_FILM),
+            Declared::Number(FILM_THICKNESS),
+            Declared::Number(FILM_IOR),
+        ]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         if inputs.switch(ENABLE_OPACITY, diagnostics)? {
             let opacity = inputs.weight(OPACITY, diagnostics)?;
@@ -166,6 +190,12 @@ impl Dialect for OmniSurface {
             color: p.color(SHEEN_COLOR)?,
             roughness: p.number(SHEEN_ROUGHNESS)?,
         };
+        let has_film = p.switch(ENABLE_FILM);
+        let film = FilmLayer {
+            weight: p.constant(if has_film { 1.0 } else { 0.0 })?,
+            thickness_nm: p.number(FILM_THICKNESS)?,
+            ior: p.number(FILM_IOR)?,
+        };
         let roughness = p.number(ROUGHNESS)?;
         Ok(Layers {
             diffuse_roughness: p.number(DIFFUSE_ROUGHNESS)?,
@@ -179,6 +209,7 @@ impl Dialect for OmniSurface {
             thin_walled: p.switch(THIN_WALLED),
             coat: Some(coat),
             sheen: Some(sheen),
+            film: Some(film),
             presence: presence(p, ENABLE_OPACITY, OPACITY, OPACITY_THRESHOLD)?,
             ..Layers::plastic(base, ior, p)?
         })

@@ -83,6 +83,34 @@ impl Dialect for OpenPbr {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[
+            Declared::Number(BASE_WEIGHT),
+            Declared::Color(BASE_COLOR),
+            Declared::Number(DIFFUSE_ROUGHNESS),
+            Declared::Color(SPECULAR_COLOR),
+            Declared::Number(ANISOTROPY),
+            Declared::Number(SUBSURFACE_WEIGHT),
+            Declared::Color(SUBSURFACE_COLOR),
+            Declared::Number(SUBSURFACE_ANISOTROPY),
+            Declared::Number(FUZZ_WEIGHT),
+            Declared::Color(FUZZ_COLOR),
+            Declared::Number(FUZZ_ROUGHNESS),
+            Declared::Number(COAT_WEIGHT),
+            Declared::Color(COAT_COLOR),
+            Declared::Number(COAT_ROUGHNESS),
+            Declared::Number(COAT_ANISOTROPY),
+            Declared::Number(COAT_DARKENING),
+            Declared::Number(COAT_IOR),
+            Declared::Number(FILM_WEIGHT),
+            Declared::Number(FILM_THICKNESS),
+            Declared::Number(FILM_IOR),
+            Declared::Number(EMISSION_LUMINANCE),
+            Declared::Color(EMISSION_COLOR),
+        ]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         if let Some(why) = inputs.cut_out(OPACITY, diagnostics)? {
             return Ok(Response::CutOut(why));

@@ -51,6 +51,17 @@ impl Dialect for PreviewSurface {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[
+            Declared::Color(DIFFUSE_COLOR),
+            Declared::Color(SPECULAR_COLOR),
+            Declared::Color(EMISSIVE_COLOR),
+            Declared::Number(CLEARCOAT),
+            Declared::Number(CLEARCOAT_ROUGHNESS),
+        ]
+    }
+
     /// Opacity under 0.5 is glass in the mode `transparent`, and a hole in the mode `presence` or under a threshold.
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         let looked_up = self.opacity(inputs, diagnostics)?;

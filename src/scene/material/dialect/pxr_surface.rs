@@ -50,6 +50,11 @@ impl Dialect for PxrSurface {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[Declared::Number(DIFFUSE_GAIN), Declared::Color(DIFFUSE_COLOR), Declared::Color(REFRACTION_COLOR)]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         if let Some(why) = inputs.cut_out(PRESENCE, diagnostics)? {
             return Ok(Response::CutOut(why));

@@ -82,6 +82,35 @@ impl Dialect for StandardSurface {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[
+            Declared::Number(BASE),
+            Declared::Color(BASE_COLOR),
+            Declared::Number(DIFFUSE_ROUGHNESS),
+            Declared::Number(SPECULAR),
+            Declared::Color(SPECULAR_COLOR),
+            Declared::Number(ANISOTROPY),
+            Declared::Number(ROTATION),
+            Declared::Number(SUBSURFACE),
+            Declared::Color(SUBSURFACE_COLOR),
+            Declared::Number(SHEEN),
+            Declared::Color(SHEEN_COLOR),
+            Declared::Number(SHEEN_ROUGHNESS),
+            Declared::Number(COAT),
+            Declared::Color(COAT_COLOR),
+            Declared::Number(COAT_ROUGHNESS),
+            Declared::Number(COAT_ANISOTROPY),
+            Declared::Number(COAT_IOR),
+            Declared::Number(COAT_AFFECT_COLOR),
+            Declared::Number(COAT_AFFECT_ROUGHNESS),
+            Declared::Number(FILM_THICKNESS),
+            Declared::Number(FILM_IOR),
+            Declared::Number(EMISSION),
+            Declared::Color(EMISSION_COLOR),
+        ]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         if let Some(why) = inputs.cut_out(OPACITY, diagnostics)? {
             return Ok(Response::CutOut(why));

@@ -30,6 +30,7 @@ const IOR: Number = input("refract_ior", 1.6);
 const DISPERSION_ON: Switch = input("dispersion_on", false);
 const ABBE_NUMBER: Number = input("dispersion", 50.0);
 const DIFFUSE: Color = input("diffuse", [0.5; 3]);
+const DIFFUSE_ROUGHNESS: Number = input("roughness", 0.0);
 const REFLECT: Color = input("reflect", [0.0; 3]);
 const REFRACT_COLOR: Color = input("refract", [0.0; 3]);
 const FOG_COLOR: Color = input("fog_color", [1.0; 3]);
@@ -68,6 +69,11 @@ impl Dialect for VRayMtl {
         ]
     }
 
+    #[cfg(test)]
+    fn transported(&self) -> &'static [Declared] {
+        &[Declared::Color(DIFFUSE), Declared::Number(DIFFUSE_ROUGHNESS), Declared::Color(REFLECT)]
+    }
+
     fn response(&self, inputs: &Inputs<'_>, diagnostics: &mut Diagnostics) -> Result<Response> {
         if let Some(why) = inputs.cut_out(OPACITY, diagnostics)? {
             return Ok(Response::CutOut(why));
@@ -100,6 +106,7 @@ impl Dialect for VRayMtl {
         let divisor = p.max(transmission, tiny)?;
         let ior = p.number(IOR)?;
         Ok(Layers {
+            diffuse_roughness: p.number(DIFFUSE_ROUGHNESS)?,
             metalness,
             metal: MetalLayer::Tint { f0: diffuse, f82: white },
             specular_color: reflect,

@@ -41,9 +41,13 @@ fn code(markdown: &str) -> impl Iterator<Item = &str> {
     markdown.split('`').skip(1).step_by(2)
 }
 
+fn every_input<'a>(dialect: &&'a dyn Dialect) -> impl Iterator<Item = &'a Declared> {
+    dialect.inputs().iter().chain(dialect.transported())
+}
+
 #[test]
 fn every_input_that_a_dialect_names_is_in_its_list() {
-    let listed: BTreeSet<_> = DIALECTS.iter().flat_map(|dialect| dialect.inputs()).map(name_of).collect();
+    let listed: BTreeSet<_> = DIALECTS.iter().flat_map(every_input).map(name_of).collect();
     let mut named = BTreeSet::new();
     for entry in fs::read_dir(root().join("src/scene/material/dialect")).expect("is there") {
         let path = entry.expect("is readable").path();
@@ -74,16 +78,35 @@ fn the_documentation_lists_every_dialect_with_its_inputs_and_defaults() {
     for (dialect, row) in DIALECTS.iter().zip(rows) {
         let ids: Vec<_> = code(&row[0]).collect();
         assert_eq!(ids, dialect.ids(), "{row:?}");
-        let cells = row[1..].join(" ");
-        let documented: BTreeSet<String> =
-            code(&cells).filter(|word| word.contains(" = ")).map(str::to_owned).collect();
-        let read: BTreeSet<String> = dialect
-            .inputs()
-            .iter()
-            .map(|declared| format!("{} = {}", name_of(declared), default_of(declared)))
-            .collect();
-        assert_eq!(documented, read, "{ids:?}");
+        assert_eq!(documented(&row[1..]), stated(dialect.inputs()), "{ids:?}");
     }
+}
+
+#[test]
+fn the_documentation_lists_every_dialect_with_what_light_transport_reads_beside() {
+    let document = read(&root().join("docs/materials.md"));
+    let rows = table(&document, "model");
+    assert_eq!(rows.len(), DIALECTS.len(), "one row a dialect");
+    for (dialect, row) in DIALECTS.iter().zip(rows) {
+        let ids: Vec<_> = code(&row[0]).collect();
+        assert_eq!(ids, dialect.ids(), "{row:?}");
+        assert_eq!(documented(&row[1..]), stated(dialect.transported()), "{ids:?}");
+        // What is named without a default is read by both.
+        let names: BTreeSet<&str> = every_input(dialect).map(name_of).collect();
+        let cells = row[1..].join(" ");
+        for word in code(&cells).filter(|word| !word.contains(" = ") && !word.ends_with("normal")) {
+            assert!(names.contains(word), "{ids:?} does not read {word}");
+        }
+    }
+}
+
+/// The inputs with their defaults in the cells of a table.
+fn documented(cells: &[String]) -> BTreeSet<String> {
+    code(&cells.join(" ")).filter(|word| word.contains(" = ")).map(str::to_owned).collect()
+}
+
+fn stated(inputs: &[Declared]) -> BTreeSet<String> {
+    inputs.iter().map(|declared| format!("{} = {}", name_of(declared), default_of(declared))).collect()
 }
 
 #[test]
