@@ -139,6 +139,21 @@ impl Expression {
         Ok(Self { moves: builder.moves, closures, accepting, start, labels, groups })
     }
 
+    /// What an AOV that is a part of the beauty shows: its own expression, or that of its argument.
+    pub fn of_aov(name: &str, argument: &str) -> Result<Self, String> {
+        let quoted = |quote: char| format!("C.*<[LO].{quote}{argument}{quote}>");
+        match name {
+            "diffuse" => Self::parse("C<.D>.*[LOB]"),
+            "reflection" => Self::parse("C<R[GS]>.*[LOB]"),
+            "transmission" => Self::parse("C<T[GSs]>.*[LOB]"),
+            "emission" => Self::parse("C[LOB]"),
+            "light_group" if argument.is_empty() => Err("names no light group: light_group:NAME".to_owned()),
+            "light_group" => Self::parse(&quoted(if argument.contains('\'') { '"' } else { '\'' })),
+            "lpe" => Self::parse(argument),
+            other => Err(format!("'{other}' is no part of the beauty")),
+        }
+    }
+
     /// The same expression with labels that mean these light groups.
     pub fn with_groups(mut self, names: &[String]) -> Self {
         let index = |label: &String| names.iter().position(|name| name == label).map(|i| i as u32);
