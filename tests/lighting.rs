@@ -358,6 +358,18 @@ fn glowing_objects() -> Stagehand {
     s.sphere("/World/Ball", 0.5, at(1.0, 0.0, 4.0) * DMat4::from_scale(DVec3::new(1.0, 0.5, 1.0)), Some(glow));
     let turned = at(3.0, 0.0, 4.0) * DMat4::from_rotation_y(0.7);
     s.solid(description::Shape::Cube { path: "/World/Cube".into(), size: 0.8 }, turned, Some(glow));
+    let upright = at(0.0, 2.0, 4.0) * DMat4::from_scale(DVec3::new(1.0, 1.5, 0.7));
+    let axis = "Y".to_owned();
+    let capsule = description::Shape::Capsule {
+        path: "/World/Capsule".into(),
+        height: 1.0,
+        radius_bottom: 0.3,
+        radius_top: 0.2,
+        axis: axis.clone(),
+    };
+    s.solid(capsule, upright, Some(glow));
+    let cone = description::Shape::Cone { path: "/World/Cone".into(), height: 1.0, radius: 0.4, axis };
+    s.solid(cone, at(2.0, 2.0, 4.0), Some(glow));
     s
 }
 

@@ -1,7 +1,7 @@
 //! Objects that shine: those of geometry lights, and those whose materials emit.
 //!
-//! Triangles, spheres, boxes and rectangles that stand still are sampled, piece by piece. What moves, and other analytic
-//! solids, shines where rays happen to meet it: sampling it would need its place at the time of each path.
+//! What stands still is sampled, piece by piece: triangles, spheres, the faces of boxes, the pieces of solids of revolution.
+//! What moves shines where rays happen to meet it: sampling it would need its place at the time of each path.
 //!
 //! A material emits to both sides, as surfaces do in Storm, Arnold and Cycles. A geometry light is an area light, whose normals point
 //! outwards: it shines to that side, so that its power is π times area times radiance.
@@ -10,7 +10,7 @@ use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use super::color::Color;
-use super::shape::{Ellipsoid, Rectangle, Triangle};
+use super::shape::{Ellipsoid, Rectangle, Ring, Rings, Triangle};
 use crate::diagnostics::Diagnostics;
 use crate::geometry::{Hit, Shape, Solid};
 use crate::light::{Ellipsoid as WorldEllipsoid, Light, MaterialSync, Shape as LightShape, White};
@@ -50,6 +50,7 @@ enum Surface {
     Mesh { render_from_object: DAffine3, is_mirrored: bool },
     Sphere(Box<Ellipsoid>),
     Faces(Vec<Rectangle>),
+    Rings(Box<Rings>),
     Nothing,
 }
 
@@ -58,6 +59,7 @@ pub(super) enum Piece<'a> {
     Triangle(Triangle),
     Sphere(&'a Ellipsoid),
     Face(&'a Rectangle),
+    Ring(Ring<'a>),
 }
 
 /// A piece that may be chosen.
@@ -284,7 +286,7 @@ impl Object {
             Shape::Solid(solid @ (Solid::Cuboid(_) | Solid::Rectangle(_))) => {
                 Surface::Faces(faces(solid, &place, is_two_sided))
             }
-            Shape::Solid(Solid::Revolved(_)) => Surface::Nothing,
+            Shape::Solid(Solid::Revolved(_)) => Surface::Rings(Box::new(Rings::new(&place))),
         };
     }
 
@@ -294,6 +296,10 @@ impl Object {
             Surface::Nothing => 0,
             Surface::Sphere(_) => 1,
             Surface::Faces(faces) => faces.len(),
+            Surface::Rings(_) => match view.scene.objects.placed(self.instance, 0.0).0 {
+                Shape::Solid(Solid::Revolved(solid)) => solid.piece_count() as usize,
+                _ => 0,
+            },
             Surface::Mesh { .. } => match view.scene.objects.placed(self.instance, 0.0).0 {
                 Shape::Mesh(mesh) => mesh.len(),
                 _ => 0,
@@ -302,11 +308,17 @@ impl Object {
     }
 
     /// The piece that is a primitive.
-    pub(super) fn piece(&self, view: &View<'_>, primitive: u32) -> Option<Piece<'_>> {
+    pub(super) fn piece<'b>(&'b self, view: &'b View<'_>, primitive: u32) -> Option<Piece<'b>> {
         match &self.surface {
             Surface::Nothing => None,
             Surface::Sphere(sphere) => Some(Piece::Sphere(sphere)),
             Surface::Faces(faces) => faces.get(primitive as usize).map(Piece::Face),
+            Surface::Rings(rings) => match view.scene.objects.placed(self.instance, 0.0).0 {
+                Shape::Solid(Solid::Revolved(solid)) => {
+                    Some(Piece::Ring(Ring::new(solid, primitive, rings, self.is_two_sided())))
+                }
+                _ => None,
+            },
             Surface::Mesh { render_from_object, is_mirrored } => {
                 let (Shape::Mesh(mesh), _) = view.scene.objects.placed(self.instance, 0.0) else { return None };
                 let local = mesh.corners(primitive, 0.0);
@@ -343,12 +355,17 @@ impl Piece<'_> {
             Self::Triangle(triangle) => triangle.area(),
             Self::Sphere(sphere) => sphere.area(),
             Self::Face(face) => face.area(),
+            Self::Ring(ring) => ring.area(),
         }
     }
 
     /// Intensity where it is brightest over radiance times area.
     fn intensity_factor(&self) -> f64 {
-        if matches!(self, Self::Sphere(_)) { 0.25 } else { 1.0 }
+        match self {
+            Self::Triangle(_) | Self::Face(_) => 1.0,
+            // The mean over all directions.
+            Self::Sphere(_) | Self::Ring(_) => 0.25,
+        }
     }
 }
 
@@ -373,7 +390,7 @@ fn faces(solid: &Solid, place: &DAffine3, is_two_sided: bool) -> Vec<Rectangle> 
     (0..3).flat_map(|i| [-1.0, 1.0].map(|sign| face(i, sign, sign * axis(i)))).collect()
 }
 
-/// Area of an object in the world at the scene's own time; 0 of solids that have none here.
+/// Area of an object in the world at the scene's own time.
 fn area(view: &View<'_>, instance: u32) -> f64 {
     let (shape, place) = view.scene.objects.placed(instance, 0.0);
     match shape {
@@ -387,6 +404,9 @@ fn area(view: &View<'_>, instance: u32) -> f64 {
         Shape::Solid(solid @ (Solid::Cuboid(_) | Solid::Rectangle(_))) => {
             faces(solid, &place, true).iter().map(Rectangle::area).sum()
         }
-        Shape::Solid(Solid::Revolved(_)) => 0.0,
+        Shape::Solid(Solid::Revolved(solid)) => {
+            let rings = Rings::new(&place);
+            (0..solid.piece_count()).map(|primitive| Ring::new(solid, primitive, &rings, true).area()).sum()
+        }
     }
 }

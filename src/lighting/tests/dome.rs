@@ -56,7 +56,7 @@ fn images_are_sampled_by_how_bright_they_are() {
         let p = DVec3::ZERO;
         let red = |d: DVec3| dome.looked_up(&store, d)[0];
         // The density's integral, and the light's, by brute force.
-        let rows = 600;
+        let rows = 400;
         let cell = 4.0 * PI / (2 * rows * rows) as f64;
         let (mut total, mut brute) = (0.0, 0.0);
         let octant = |d: DVec3| usize::from(d.x > 0.0) + 2 * usize::from(d.y > 0.0) + 4 * usize::from(d.z > 0.2);
@@ -133,10 +133,10 @@ fn half_of_the_samples_go_through_portals() {
         let shape = Shape { portals: portals.clone(), ..shape(Layout::Latlong) };
         let dome = Dome::new(&shape, image, &store, DVec3::new(0.1, 0.2, 0.3));
         let p = DVec3::new(0.2, -0.4, 0.1);
-        let rows = 800;
+        let rows = 500;
         let cell = 4.0 * PI / (2 * rows * rows) as f64;
         let total: f64 = directions(rows).map(|d| cell * dome.pdf(p, None, d)).sum();
-        assert!((total - 1.0).abs() < 3e-3, "{total}");
+        assert!((total - 1.0).abs() < 4e-3, "{total}");
         let mut random = Random(1);
         let (mut through, count) = (0, 10_000);
         let frames: Vec<_> =
