@@ -483,7 +483,7 @@ fn a_cancelled_render_keeps_finished_tiles() {
             cancel.store(true, Ordering::Relaxed);
         }
     };
-    let control = abbe::render::Control { cancel: &cancel, progress: &stop };
+    let control = abbe::render::Control { cancel: &cancel, progress: &stop, pass: None };
     let plan = the_plan(&scene, &request);
     let image = abbe::render::render(&scene, &plan, &Default::default(), &control).unwrap();
     assert!(!image.statistics.complete);

@@ -207,7 +207,7 @@ fn watch(
     std::thread::scope(|threads| {
         let (send, receive) = sync_channel(1);
         threads.spawn(move || {
-            let control = Control { cancel, progress: &note };
+            let control = Control { cancel, progress: &note, pass: None };
             let work = AssertUnwindSafe(|| render::render(scene, plan, registry, &control));
             let outcome = match catch_unwind(work) {
                 Ok(outcome) => outcome.map_err(Failure::from),

@@ -18,8 +18,16 @@ use crate::film::sum::{TreeSum, is_aligned, mean, valid_fraction, variance_of_me
 use crate::film::{Film, Layer, SampleRange, Sums, Values, Window};
 
 /// Attributes that tell of a part, not of the render: they may differ between parts and the result does not have them.
-pub const PER_PART: &[&str] =
-    &["abbe:commandLine", "abbe:crop", "abbe:renderTime", "abbe:statistics", "abbe:threads", "abbe:window", "capDate"];
+pub const PER_PART: &[&str] = &[
+    "abbe:clampedSamples",
+    "abbe:commandLine",
+    "abbe:crop",
+    "abbe:renderTime",
+    "abbe:statistics",
+    "abbe:threads",
+    "abbe:window",
+    "capDate",
+];
 
 /// One input.
 struct Part {

@@ -120,6 +120,19 @@ impl Layer {
     }
 }
 
+impl Layer {
+    /// Keeps sums from now on, if there are any of such an AOV.
+    pub fn keep_sums(&mut self) {
+        if self.sums.is_none() && self.aov.has_sums() {
+            let pixels = match &self.values {
+                Values::Float(values) => values.len(),
+                Values::Uint(values) => values.len(),
+            } / self.aov.channels.len();
+            self.sums = Some(Sums { values: vec![0.0; pixels * self.aov.sum_count()], counts: vec![0; pixels] });
+        }
+    }
+}
+
 /// A rendered image: all layers over one window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {

@@ -4,6 +4,9 @@ use super::aov::{self, Aov, Merge};
 use super::sum::{self, TreeSum};
 use super::{Layer, Values};
 
+/// A value that errors are compared with at least: a hundredth of white, below which an image is black to the eye.
+pub const FLOOR: f64 = 0.01;
+
 /// Collects the samples of one pixel for all layers; used again for the next pixel.
 #[derive(Clone, Debug)]
 pub struct PixelAccumulator {
@@ -13,8 +16,12 @@ pub struct PixelAccumulator {
     first_sample: u32,
     /// One past the last sample that was begun.
     next_sample: u32,
+    /// The most that a channel of a sample of the beauty may have.
+    clamp: f64,
     /// Values that were not finite in `f32`: counted, and treated as absent (light: as 0).
     pub non_finite: u64,
+    /// Samples of the beauty that were clamped.
+    pub clamped: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -55,7 +62,13 @@ impl PixelAccumulator {
             }
         };
         let slots = aovs.into_iter().enumerate().map(slot).collect();
-        Self { slots, color, first_sample, next_sample: first_sample, non_finite: 0 }
+        let clamp = f64::INFINITY;
+        Self { slots, color, first_sample, next_sample: first_sample, clamp, non_finite: 0, clamped: 0 }
+    }
+
+    /// The same with samples of the beauty scaled down to at most `clamp` in R, G and B, if there is one.
+    pub fn clamped_to(self, clamp: Option<f64>) -> Self {
+        Self { clamp: clamp.unwrap_or(f64::INFINITY), ..self }
     }
 
     /// Forgets the last pixel.
@@ -69,6 +82,47 @@ impl PixelAccumulator {
                 Slot::All { .. } | Slot::Count | Slot::Variance { .. } => {}
             }
         }
+    }
+
+    /// Takes up pixel `pixel` of `layers`, which has `count` samples and their sums: a power of two of them from an aligned
+    /// beginning on, so that each sum is one node of its tree.
+    pub fn resume(&mut self, layers: &[Layer], pixel: usize, count: u32) {
+        debug_assert!(count.is_power_of_two(), "{count} samples are no node of the sum");
+        self.restart();
+        self.next_sample = self.first_sample + count;
+        for (slot, layer) in self.slots.iter_mut().zip(layers) {
+            if let (Slot::First { value }, Values::Uint(values)) = (&mut *slot, &layer.values) {
+                *value = Some(values[pixel]);
+            }
+            let Some(kept) = &layer.sums else { continue };
+            if let Slot::Mean { valid, .. } = slot {
+                *valid = kept.counts[pixel];
+            }
+            let sums = &kept.values[pixel * layer.aov.sum_count()..];
+            slot.trees().zip(sums).for_each(|(tree, &sum)| tree.push_range(count, sum));
+        }
+    }
+
+    /// Estimate of the standard error of the beauty's mean over its value: √(V/3) / (m + [`FLOOR`]), where V is the sum over R, G, B of the variances of
+    /// their means and m their mean. To V is added what one more sample would bring that differs from the mean by
+    /// m + [`FLOOR`]: a pixel whose samples agree may yet have missed what is rare, the more so the fewer they are. So no error is below 1/n.
+    ///
+    /// `None` if no layer keeps the variance.
+    pub fn relative_error(&self) -> Option<f64> {
+        let n = self.sample_count();
+        let channels = self.slots.iter().find_map(|slot| match slot {
+            Slot::Variance { sums, squares } => Some(sums.iter().zip(squares)),
+            _ => None,
+        })?;
+        let (mut variance, mut mean) = (0.0, 0.0);
+        for (sum, squares) in channels {
+            let sum = sum.total();
+            variance += sum::variance_of_mean(sum, squares.total(), n) / 3.0;
+            mean += sum.abs() / f64::from(n) / 3.0;
+        }
+        let value = mean + FLOOR;
+        let unseen = value / f64::from(n);
+        Some((variance + unseen * unseen).sqrt() / value)
     }
 
     /// How many samples the pixel has.
@@ -115,11 +169,17 @@ impl PixelAccumulator {
     }
 
     /// Adds the next sample R, G, B, A of the beauty to every layer that is made of it: `color`, `variance`.
-    pub fn add_color(&mut self, rgba: [f64; 4]) {
+    ///
+    /// Returns the factor by which light was scaled down, 1 unless the render clamps: the parts of the beauty take it too, so that they
+    /// sum to it.
+    pub fn add_color(&mut self, [r, g, b, a]: [f64; 4]) -> f64 {
+        let largest = r.max(g).max(b);
+        let scale = if largest > self.clamp { self.clamp / largest } else { 1.0 };
+        self.clamped += u64::from(scale < 1.0);
         if self.color.is_empty() {
-            return;
+            return scale;
         }
-        let value = self.finite(Some(rgba));
+        let value = self.finite(Some([r * scale, g * scale, b * scale, a]));
         for &layer in &self.color {
             match &mut self.slots[layer] {
                 Slot::All { sums } => push(sums, value),
@@ -131,6 +191,7 @@ impl PixelAccumulator {
                 _ => unreachable!("the beauty's layers are these"),
             }
         }
+        scale
     }
 
     fn finite<const N: usize>(&mut self, value: Option<[f64; N]>) -> Option<[f64; N]> {
@@ -220,6 +281,88 @@ mod tests {
         pixel.restart();
         pixel.finish(&mut layers, 0);
         assert_eq!(layers[0].values, Values::Float(vec![0.0, 0.0]));
+    }
+
+    /// A value of sample `i`, different for every `k`.
+    fn value(i: u32, k: u32) -> f64 {
+        (f64::from(i) * 0.734 + f64::from(k)).sin() * 10f64.powi(((i + k) % 7) as i32 - 3)
+    }
+
+    #[test]
+    fn a_pixel_taken_up_again_gets_the_same_bits() {
+        let aovs = ["color", "variance", "sample_count", "uv", "prim_id"].map(|name| aov::find(name).unwrap());
+        for first in [0u32, 64] {
+            let add = |pixel: &mut PixelAccumulator, begin: u32, end: u32| {
+                for i in begin..end {
+                    pixel.add_color([value(i, 0), value(i, 1), value(i, 2), 1.0]);
+                    pixel.add(3, (i % 3 > 0).then(|| [value(i, 3), value(i, 4)]));
+                    pixel.add_first(4, i + 1);
+                }
+                pixel.advance(end);
+            };
+            let mut whole = PixelAccumulator::new(aovs, first);
+            add(&mut whole, first, first + 61);
+            let mut wanted = layers(&aovs, true);
+            whole.finish(&mut wanted, 0);
+            for count in [1, 2, 4, 8, 16, 32] {
+                let mut pixel = PixelAccumulator::new(aovs, first);
+                let mut film = layers(&aovs, true);
+                add(&mut pixel, first, first + count);
+                pixel.finish(&mut film, 0);
+                pixel.restart();
+                pixel.resume(&film, 0, count);
+                add(&mut pixel, first + count, first + 61);
+                pixel.finish(&mut film, 0);
+                assert_eq!(film, wanted, "{first} {count}");
+            }
+        }
+    }
+
+    #[test]
+    fn errors_are_relative_and_never_below_what_one_sample_could_bring() {
+        let aovs = [aov::find("variance").unwrap()];
+        let mut pixel = PixelAccumulator::new(aovs, 0);
+        for _ in 0..16 {
+            pixel.add_color([0.0, 0.0, 0.0, 1.0]);
+        }
+        pixel.advance(16);
+        assert!((pixel.relative_error().unwrap() - 1.0 / 16.0).abs() < 1e-12);
+        // Half of the samples 0, half 2m: the deviation of one is m, of the mean of 64 m/8, less Bessel's correction.
+        pixel.restart();
+        for i in 0..64 {
+            pixel.add_color([f64::from(i % 2) * 2e3; 4]);
+        }
+        pixel.advance(64);
+        let wanted = (1.0 / 63.0 + 1.0 / 4096.0f64).sqrt();
+        assert!((pixel.relative_error().unwrap() / wanted - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn clamped_samples_keep_their_hue_and_are_counted() {
+        let aovs = [aov::find("color").unwrap()];
+        let mut pixel = PixelAccumulator::new(aovs, 0).clamped_to(Some(2.0));
+        let mut film = layers(&aovs, false);
+        assert!((pixel.add_color([8.0, 4.0, -2.0, 1.0]) - 0.25).abs() < 1e-15);
+        assert!((pixel.add_color([2.0, 1.0, 0.0, 1.0]) - 1.0).abs() < 1e-15);
+        pixel.advance(2);
+        pixel.finish(&mut film, 0);
+        assert_eq!(film[0].values, Values::Float(vec![2.0, 1.0, -0.25, 1.0]));
+        assert_eq!(pixel.clamped, 1);
+    }
+
+    #[test]
+    fn a_hundred_thousand_samples_lose_no_digit() {
+        // A sum in f32 stops growing at 2²⁴ units; in a tree of f64 the mean is right to its own rounding.
+        let aovs = [aov::find("color").unwrap()];
+        let mut pixel = PixelAccumulator::new(aovs, 0);
+        let mut film = layers(&aovs, false);
+        let count = 100_000;
+        for i in 0..count {
+            pixel.add_color([1e4 + f64::from(i), 0.1, 1e-6, 1.0]);
+        }
+        pixel.advance(count);
+        pixel.finish(&mut film, 0);
+        assert_eq!(film[0].values, Values::Float(vec![59_999.5, 0.1, 1e-6, 1.0]));
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod counters;
 pub mod differentials;
 mod frame;
 mod lanes;
+pub mod light_path;
 pub mod path;
 pub mod reference;
 mod screen_motion;
@@ -122,6 +123,8 @@ pub struct Task<'a> {
     pub camera: &'a Camera,
     /// One AOV per layer, in the film's order.
     pub aovs: &'a [&'static Aov],
+    /// What each layer's AOV asks for besides: a light path expression, a light group; empty if nothing.
+    pub arguments: &'a [String],
     /// What the layers need.
     pub needs: Needs,
     /// Wavelengths.
@@ -132,6 +135,10 @@ pub struct Task<'a> {
     pub samples: SampleRange,
     /// What the numbers of colours mean.
     pub color_space: ColorSpace,
+    /// How often light may be scattered.
+    pub depth_limits: path::DepthLimits,
+    /// Image file that is seen through glass, behind everything.
+    pub plate: Option<&'a str>,
     /// Full raster, pixels.
     pub resolution: [u32; 2],
     /// Whether something moves and vectors of motion are wanted; they are 0 if not.
@@ -146,6 +153,10 @@ pub trait Integrator: Send + Sync {
     fn summary(&self) -> &str;
     /// The AOVs it offers.
     fn aovs(&self) -> Vec<&'static Aov>;
+    /// Whether it computes light: its samples are then many unless told otherwise, and spread by the pixel filter.
+    fn transports_light(&self) -> bool {
+        false
+    }
     /// What it needs for `aovs`, in a scene where something disperses or nothing does.
     fn needs(&self, aovs: &[&Aov], is_dispersive: bool) -> Needs {
         Needs::of(aovs, is_dispersive)

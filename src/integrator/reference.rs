@@ -44,6 +44,10 @@ impl Integrator for Reference {
         AOVS.iter().filter(|aov| matches!(aov.name, COLOR | VARIANCE | SAMPLE_COUNT)).collect()
     }
 
+    fn transports_light(&self) -> bool {
+        true
+    }
+
     fn prepare<'a>(&self, task: &'a Task<'a>) -> Result<Box<dyn PreparedIntegrator + 'a>> {
         Ok(Box::new(Prepared {
             task,

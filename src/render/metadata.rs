@@ -13,8 +13,18 @@ use crate::spectrum::color::RgbSpace;
 use crate::spectrum::sensor::ColorSpace;
 use glam::{DMat4, DVec4};
 
+/// How a render ended.
+pub(super) struct Outcome {
+    pub(super) complete: bool,
+    /// Samples per pixel, or the most that a pixel could have.
+    pub(super) samples: u32,
+    pub(super) reached_limit: bool,
+    /// Samples that were scaled down.
+    pub(super) clamped: u64,
+}
+
 /// What a film of `plan` says about itself. Times and machines are left out, so that the same render gives the same bytes.
-pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bool) -> Metadata {
+pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, outcome: &Outcome) -> Metadata {
     let mut metadata = Metadata { compression: plan.compression.clone(), ..Metadata::default() };
     // What the product wants comes first: it does not replace what is true.
     metadata.attributes.clone_from(&plan.header);
@@ -54,10 +64,30 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
     if let Some([open, close]) = plan.shutter {
         set("abbe:shutter", Attribute::Text(format!("{open}:{close} frames from the time code")));
     }
-    set("abbe:samples", Attribute::Int(plan.samples.total as i32));
+    let total = if outcome.reached_limit { outcome.samples } else { plan.samples.total };
+    set("abbe:samples", Attribute::Int(total as i32));
+    if let Some(target) = plan.error_target {
+        set("abbe:errorTarget", Attribute::Double(target));
+    }
+    if outcome.reached_limit {
+        set("abbe:reproducible", Attribute::Int(0));
+        set(
+            "abbe:timeLimit",
+            Attribute::Text(format!(
+                "{} s were over after {} of {} samples: another run may end with others; the same number of samples gives the same bits",
+                plan.time_limit.unwrap_or_default(),
+                outcome.samples,
+                plan.samples.total
+            )),
+        );
+    }
+    if let Some(clamp) = plan.clamp {
+        set("abbe:clamp", Attribute::Double(clamp));
+        set("abbe:clampedSamples", Attribute::Text(outcome.clamped.to_string()));
+    }
     set("abbe:seed", Attribute::Text(plan.seed.to_string()));
     set("abbe:settingsHash", Attribute::Text(settings_hash(scene, plan)));
-    if !complete {
+    if !outcome.complete {
         // A whole image says nothing, so that it is the same file however it came about.
         set("abbe:complete", Attribute::Int(0));
     }
@@ -90,6 +120,7 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
     set("chromaticities", Attribute::Chromaticities(space.chromaticities().map(|xy| xy.map(|v| v as f32))));
     if transports {
         set("colorInteropID", text(space.interop_id()));
+        set("abbe:pixelFilter", Attribute::Text(filter_text(plan)));
         if let ColorSpace::Rgb(RgbSpace { white: [x, y], .. }) = space {
             set("adoptedNeutral", Attribute::Vec2([x as f32, y as f32]));
         }
@@ -113,6 +144,11 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, complete: bo
     set("worldToCamera", Attribute::Matrix(to_camera));
     set("worldToNDC", Attribute::Matrix(to_ndc));
     metadata
+}
+
+fn filter_text(plan: &Plan) -> String {
+    let shape = serde_json::to_value(plan.filter.shape()).ok();
+    format!("{} {} px", shape.as_ref().and_then(serde_json::Value::as_str).unwrap_or_default(), plan.filter.width())
 }
 
 /// Standard attributes of a camera, in the units that OpenEXR defines for them; those that nothing is authored for are left
@@ -196,6 +232,9 @@ fn settings_hash(scene: &Scene, plan: &Plan) -> String {
     });
     if transports {
         decisive["colorSpace"] = json!(plan.color_space.interop_id());
+        decisive["pixelFilter"] = json!(filter_text(plan));
+        decisive["errorTarget"] = json!(plan.error_target);
+        decisive["clamp"] = json!(plan.clamp);
     }
     // FNV-1a (Fowler, Noll, Vo): tells settings apart, guards nothing.
     let hash = decisive

@@ -1,28 +1,29 @@
 //! Settings, plan, tiles, progress, statistics: a render from request to film.
 //!
 //! Tiles are rendered by any thread in any order; what a pixel gets depends on the pixel alone, so the film has the same
-//! bits for any number of threads. Cancelling leaves the finished tiles.
+//! bits for any number of threads and passes. Cancelling leaves the finished tiles.
 
 mod driver;
 mod layers;
 pub mod metadata;
 mod motion;
+mod passes;
 pub mod plan;
 pub mod request;
+mod sampling;
 mod settings;
 mod shot;
 mod textures;
 pub mod trace;
 mod validity;
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 pub use layers::PlannedLayer;
+use passes::{Passed, Passes, Tally};
 pub use plan::{Plan, plan};
 pub use request::Request;
 pub use trace::trace;
@@ -32,17 +33,13 @@ use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::Aov;
 use crate::film::metadata::Metadata;
-use crate::film::pixel::PixelAccumulator;
-use crate::film::{Film, Layer, Values, Window};
+use crate::film::{Film, Layer};
 use crate::integrator::chain::Counters;
 use crate::integrator::{Registry, Task};
 use crate::sampler::Sampler;
 use crate::scene::view::View;
 use crate::scene::{Counts, Scene};
 use crate::texture::TextureCounts;
-
-/// Side of a tile, pixels: small enough to share the work evenly, large enough to forget its administration.
-const TILE: i32 = 16;
 
 /// More values than this (4 TiB of floats) are refused before memory is asked for.
 const MAX_VALUES: usize = 1 << 40;
@@ -62,13 +59,16 @@ pub struct Control<'a> {
     pub cancel: &'a AtomicBool,
     /// Called after every tile, from any thread.
     pub progress: &'a (dyn Fn(Progress) + Sync),
+    /// Called with the film of the first 1, 2, 4, 8 … samples of each pixel, and of all of them; `false` ends the render there. Without it
+    /// (and without a time limit) all samples are rendered in one go.
+    pub pass: Option<&'a (dyn Fn(&Film) -> bool + Sync)>,
 }
 
 impl Control<'static> {
     /// Nobody watches and nobody stops.
     pub fn none() -> Self {
         static NEVER: AtomicBool = AtomicBool::new(false);
-        Self { cancel: &NEVER, progress: &|_| {} }
+        Self { cancel: &NEVER, progress: &|_| {}, pass: None }
     }
 }
 
@@ -93,6 +93,14 @@ pub struct Statistics {
     pub textures: TextureCounts,
     /// What tracing cost.
     pub counters: Counters,
+    /// Samples of all pixels.
+    pub samples: u64,
+    /// Passes rendered: 1 unless the render grew.
+    pub passes: u32,
+    /// Whether the time limit left samples out.
+    pub reached_time_limit: bool,
+    /// Samples that were scaled down to the clamp.
+    pub clamped_samples: u64,
     /// Values that were not finite and became absent.
     pub non_finite_values: u64,
     /// Warnings of the bridge, the scene, the plan and the render.
@@ -156,15 +164,19 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
     let view = view(scene, plan, &camera);
     textures::prepare(scene, &plan.needs, plan.texture_memory)?;
     let aovs: Vec<&'static Aov> = plan.layers.iter().map(|layer| layer.aov).collect();
+    let arguments: Vec<String> = plan.layers.iter().map(|layer| layer.argument.clone()).collect();
     let task = Task {
         view: &view,
         camera: &camera,
         aovs: &aovs,
+        arguments: &arguments,
         needs: plan.needs,
         optics: plan.optics,
-        sampler: Sampler::new(plan.samples.total, plan.seed)?.over_time(plan.shutter.is_some()),
+        sampler: Sampler::new(plan.samples.total, plan.seed)?.over_time(plan.shutter.is_some()).filtered(&plan.filter),
         samples: plan.samples,
         color_space: plan.color_space,
+        depth_limits: plan.depth_limits,
+        plate: plan.plate.as_deref(),
         resolution: plan.resolution,
         motion_vectors: plan.motion_vectors,
     };
@@ -173,46 +185,10 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
     let prepare_seconds = begin.elapsed().as_secs_f64();
 
     let begin = Instant::now();
-    let tiles = tiles(plan.window);
-    let total = plan.window.area() as u64;
-    let done = AtomicU64::new(0);
-    let shared = Mutex::new((&mut film, Counters::default(), 0u64));
-    tiles.par_iter().for_each_init(
-        || (prepared.worker(), PixelAccumulator::new(aovs.iter().copied(), plan.samples.begin), Counters::default(), 0),
-        |(worker, pixel, counted, non_finite_counted), &tile| {
-            if control.cancel.load(Ordering::Relaxed) || textures::has_failed(scene) {
-                return;
-            }
-            let keep_sums = !plan.samples.is_all();
-            let mut layers: Vec<_> =
-                aovs.iter().map(|aov| Layer::new(aov, String::new(), tile.area(), keep_sums)).collect();
-            let mut index = 0;
-            for y in tile.y0..tile.y1 {
-                for x in tile.x0..tile.x1 {
-                    pixel.restart();
-                    worker.render([x, y], plan.samples.begin..plan.samples.end, pixel);
-                    pixel.advance(plan.samples.end);
-                    pixel.finish(&mut layers, index);
-                    index += 1;
-                }
-                if control.cancel.load(Ordering::Relaxed) {
-                    return;
-                }
-            }
-            let counters = worker.counters();
-            {
-                let mut shared = shared.lock().expect("no thread panics while it holds the film");
-                copy_tile(shared.0, tile, &layers);
-                shared.1.add(&counters.since(counted));
-                shared.2 += pixel.non_finite - *non_finite_counted;
-            }
-            (*counted, *non_finite_counted) = (counters, pixel.non_finite);
-            let done = done.fetch_add(tile.area() as u64, Ordering::Relaxed) + tile.area() as u64;
-            (control.progress)(Progress { done, total });
-        },
-    );
+    let passes = Passes { scene, plan, prepared: &*prepared, control, began: begin };
+    let Passed { tally: Tally { counters, non_finite, clamped, samples }, pixels, complete, passes, reached_limit } =
+        passes.run(&mut film);
     let trace_seconds = begin.elapsed().as_secs_f64();
-    let (_, counters, non_finite_values) = shared.into_inner().expect("all threads have ended well");
 
     let mut warnings = scene.diagnostics().clone();
     warnings.extend(&plan.diagnostics);
@@ -254,16 +230,24 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
             ),
         );
     }
-    if non_finite_values > 0 {
+    if non_finite > 0 {
         warnings.warn(
             "non-finite",
             &scene.document().stage.source,
-            format!("{non_finite_values} values were not finite and are absent: `abbe trace` shows a pixel's chain"),
+            format!(
+                "{non_finite} values were not finite and are absent (light: 0): `abbe trace` shows a pixel's chain"
+            ),
         );
     }
-    let pixels = done.into_inner();
-    let complete = pixels == total;
-    let metadata = metadata::metadata(scene, plan, &camera, complete);
+    if clamped > 0 {
+        warnings.warn(
+            "clamped-samples",
+            &scene.document().stage.source,
+            format!("{clamped} of {samples} samples were brighter than --clamp and were scaled down: light is missing"),
+        );
+    }
+    let outcome = metadata::Outcome { complete, samples: film.samples.end, reached_limit, clamped };
+    let metadata = metadata::metadata(scene, plan, &camera, &outcome);
     let statistics = Statistics {
         complete,
         pixels,
@@ -271,7 +255,11 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
         scene: scene.counts,
         textures: scene.textures.counts(),
         counters,
-        non_finite_values,
+        samples,
+        passes,
+        reached_time_limit: reached_limit,
+        clamped_samples: clamped,
+        non_finite_values: non_finite,
         warnings,
         prepare_seconds,
         trace_seconds,
@@ -308,43 +296,4 @@ fn empty_film(plan: &Plan, camera: &Camera) -> Result<Film> {
             .map(|layer| Layer { half: layer.half, ..Layer::new(layer.aov, layer.name.clone(), pixels, keep_sums) })
             .collect(),
     })
-}
-
-/// The window in tiles, row by row.
-fn tiles(window: Window) -> Vec<Window> {
-    let mut tiles = Vec::new();
-    for y0 in (window.y0..window.y1).step_by(TILE as usize) {
-        for x0 in (window.x0..window.x1).step_by(TILE as usize) {
-            tiles.push(Window { x0, y0, x1: (x0 + TILE).min(window.x1), y1: (y0 + TILE).min(window.y1) });
-        }
-    }
-    tiles
-}
-
-/// Copies the pixels of a finished tile to their place in the film.
-fn copy_tile(film: &mut Film, tile: Window, layers: &[Layer]) {
-    let window = film.window;
-    for (to, from) in film.layers.iter_mut().zip(layers) {
-        let channels = to.aov.channels.len();
-        for row in 0..tile.height() {
-            let source = row * tile.width();
-            let target = ((tile.y0 - window.y0) as usize + row) * window.width() + (tile.x0 - window.x0) as usize;
-            match (&mut to.values, &from.values) {
-                (Values::Float(to), Values::Float(from)) => copy_row(to, target, from, source, tile.width(), channels),
-                (Values::Uint(to), Values::Uint(from)) => copy_row(to, target, from, source, tile.width(), channels),
-                _ => unreachable!("tiles have the film's layers"),
-            }
-            if let (Some(to), Some(from)) = (&mut to.valid, &from.valid) {
-                copy_row(to, target, from, source, tile.width(), 1);
-            }
-            if let (Some(to), Some(from)) = (&mut to.sums, &from.sums) {
-                copy_row(&mut to.values, target, &from.values, source, tile.width(), channels);
-                copy_row(&mut to.counts, target, &from.counts, source, tile.width(), 1);
-            }
-        }
-    }
-}
-
-fn copy_row<T: Copy>(to: &mut [T], target: usize, from: &[T], source: usize, pixels: usize, channels: usize) {
-    to[target * channels..][..pixels * channels].copy_from_slice(&from[source * channels..][..pixels * channels]);
 }

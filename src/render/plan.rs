@@ -10,6 +10,7 @@ use super::driver::Driver;
 use super::layers::{PlannedLayer, layers};
 use super::motion::motion_plan;
 use super::request::Request;
+use super::sampling::Sampling;
 use super::settings::{self, Attributes};
 use super::shot::{DepthOfField, Shot};
 use super::textures;
@@ -21,9 +22,11 @@ use crate::film::aov::{Aov, INTERNAL_TRANSMITTANCE};
 use crate::film::metadata::Attribute;
 use crate::film::{SampleRange, Window};
 use crate::geometry::Shape;
+use crate::integrator::path::DepthLimits;
 use crate::integrator::transmittance::absorbs;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
 use crate::optics::dispersion::Dispersion;
+use crate::sampler::filter::Filter;
 use crate::scene::description::Product;
 use crate::scene::material::{Kind, Material};
 use crate::scene::{Scene, lights};
@@ -100,6 +103,15 @@ pub struct Plan {
     pub traces_motion: bool,
     /// Samples rendered.
     pub samples: SampleRange,
+    /// Relative error of a pixel at which it gets no more samples.
+    pub error_target: Option<f64>,
+    /// Seconds after which no more samples are begun.
+    pub time_limit: Option<f64>,
+    /// The most that a sample of the beauty may have in a channel.
+    pub clamp: Option<f64>,
+    /// How samples are spread about a pixel.
+    #[serde(serialize_with = "filter")]
+    pub filter: Filter,
     /// Seed of the sample positions.
     pub seed: u64,
     /// Threads, 0 for all.
@@ -110,6 +122,10 @@ pub struct Plan {
     pub integrator: String,
     /// Layers in the film's order.
     pub layers: Vec<PlannedLayer>,
+    /// How often light may be scattered.
+    pub depth_limits: DepthLimits,
+    /// Image file that is seen through glass, behind everything.
+    pub plate: Option<String>,
     /// Wavelengths.
     pub optics: Optics,
     /// What the numbers of colours of light mean.
@@ -137,6 +153,10 @@ fn interop_id<S: serde::Serializer>(space: &ColorSpace, serializer: S) -> Result
     serializer.serialize_str(space.interop_id())
 }
 
+fn filter<S: serde::Serializer>(filter: &Filter, serializer: S) -> Result<S::Ok, S::Error> {
+    (filter.shape(), filter.width()).serialize(serializer)
+}
+
 /// Plans for every product of the scene that `request` asks for; one plan if the stage has no product.
 pub fn plan(scene: &Scene, request: &Request, registry: &Registry) -> Result<Vec<Plan>> {
     let authored = &scene.document().settings;
@@ -161,11 +181,12 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
     let mut diagnostics = Diagnostics::default();
     let attributes = Attributes::new(scene, product);
 
-    let samples = settings::samples(request, &attributes)?;
-    let shot = Shot::new(scene, request, product, samples, &mut diagnostics)?;
-    let optics = settings::optics(request, &attributes)?;
     let (integrator, layers) = layers(request, &attributes, product, registry, &mut diagnostics)?;
     let integrator = registry.find(&integrator)?;
+    let sampling = Sampling::new(request, &attributes, integrator, &layers, &mut diagnostics)?;
+    let samples = sampling.samples;
+    let shot = Shot::new(scene, request, product, samples, &mut diagnostics)?;
+    let optics = settings::optics(request, &attributes)?;
     let aovs: Vec<&Aov> = layers.iter().map(|layer| layer.aov).collect();
     let dispersive = dispersive_material(scene, &optics);
     let absorbing = scene.materials.iter().find(|material| absorbs(material));
@@ -185,7 +206,6 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         (None, None) => 0,
     };
     let driver = product.map(|p| Driver::new(p, &mut diagnostics)).unwrap_or_default();
-    attributes.warn_of_unused(&mut diagnostics);
     let color_space = settings::color_space(scene, product, &aovs, &mut diagnostics);
     textures::report_missing(scene, &needs, &mut diagnostics);
     if request.strict {
@@ -206,11 +226,17 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         motion_vectors: motion.vectors,
         traces_motion: motion.traced,
         samples,
+        error_target: sampling.error_target,
+        time_limit: sampling.time_limit,
+        clamp: sampling.clamp,
+        filter: sampling.filter,
         seed,
         threads: settings::threads(request)?,
         texture_memory: textures::memory(request)?,
         integrator: integrator.name().to_owned(),
         layers,
+        depth_limits: request.depth_limits,
+        plate: request.plate.clone(),
         optics,
         color_space,
         needs,

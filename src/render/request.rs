@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::integrator::path::DepthLimits;
+
 /// A request; what it leaves open is taken from the stage's product, then its settings, then the defaults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -14,8 +16,18 @@ pub struct Request {
     pub width: Option<u32>,
     /// Pixels; alone, it keeps the authored aspect.
     pub height: Option<u32>,
-    /// Samples per pixel.
+    /// Samples per pixel; the most of them if there is an error target.
     pub samples: Option<u32>,
+    /// Relative error at which a pixel gets no more samples; 0 for none.
+    pub error_target: Option<f64>,
+    /// Seconds after which the image is finished with the samples that it has; 0 for none.
+    pub time_limit: Option<f64>,
+    /// The most that a sample of the beauty may have in R, G, B; no limit if absent.
+    pub clamp: Option<f64>,
+    /// Name of the reconstruction filter of light.
+    pub pixel_filter: Option<String>,
+    /// Its full width, pixels.
+    pub pixel_filter_width: Option<f64>,
     /// Whether samples are spread over the lens; as the stage says if absent.
     pub depth_of_field: Option<bool>,
     /// Name of an integrator.
@@ -28,6 +40,10 @@ pub struct Request {
     pub band: Option<[f64; 2]>,
     /// Multiplies all dispersion: 0 none, 1 physical.
     pub dispersion_scale: Option<f64>,
+    /// How often light may be scattered: unlimited unless asked.
+    pub depth_limits: DepthLimits,
+    /// Image file that is seen through glass, behind everything.
+    pub plate: Option<String>,
     /// False closes all shutters at the frame.
     pub motion_blur: Option<bool>,
     /// Seed of the sample positions.

@@ -6,7 +6,6 @@ use super::request::Request;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::{Aov, Family};
-use crate::film::{SampleRange, sum};
 use crate::integrator::Optics;
 use crate::scene::Scene;
 use crate::scene::description::{Authored, AuthoredMap, Product};
@@ -20,28 +19,6 @@ const MAX_THREADS: usize = 1024;
 const SPECTRUM: [f64; 2] = [360.0, 830.0];
 /// AOV band unless chosen, nm.
 const DEFAULT_BAND: [f64; 2] = [400.0, 700.0];
-
-pub(super) fn samples(request: &Request, attributes: &Attributes<'_>) -> Result<SampleRange> {
-    let total = match request.samples {
-        Some(samples) => samples,
-        None => match attributes.integer("abbe:samples")? {
-            Some(samples) => u32::try_from(samples).unwrap_or(0),
-            None => 1,
-        },
-    };
-    crate::sampler::Sampler::new(total, 0)?;
-    match request.sample_range {
-        None => Ok(SampleRange::all(total)),
-        Some([begin, end]) if sum::is_aligned(begin, end, total) => Ok(SampleRange { begin, end, total }),
-        Some([begin, end]) => Err(Error::usage(
-            format!("--sample-range {begin}:{end}"),
-            format!(
-                "is not an aligned part of {total} samples: its length must be a power of two (or reach to the end) and \
-                 its begin a multiple of it, so that parts merge to the same bits"
-            ),
-        )),
-    }
-}
 
 /// Threads to render with, 0 for all of the machine's.
 pub(super) fn threads(request: &Request) -> Result<usize> {
@@ -137,32 +114,11 @@ impl<'a> Attributes<'a> {
         self.maps.iter().flatten().find_map(|map| map.get(name))
     }
 
-    /// What the settings ask for and this version lacks is named, unless it is what happens anyway.
-    pub(super) fn warn_of_unused(&self, diagnostics: &mut Diagnostics) {
-        const UNUSED: &[(&str, &str, &str)] = &[
-            ("abbe:errorTarget", "0", "rendering to an error target is not offered: every pixel gets all its samples"),
-            ("abbe:timeLimit", "0", "a time limit is not offered: the image is finished"),
-            ("abbe:pixelFilter", "box", "values are means over the pixel's own samples: no other filter is offered"),
-        ];
-        for (name, harmless, message) in UNUSED {
-            if let Some(authored) = self.get(name) {
-                let value = authored.value.as_str().map_or_else(|| authored.value.to_string(), str::to_owned);
-                if value != *harmless && value != format!("{harmless}.0") {
-                    diagnostics.warn(
-                        "unused-setting",
-                        format!("render settings, {name}"),
-                        format!("is {value}, but {message}"),
-                    );
-                }
-            }
-        }
-    }
-
     fn wrong(name: &str, value: &Value, wanted: &str) -> Error {
         Error::scene(format!("render settings, {name}"), format!("is {value}: {wanted} is wanted"))
     }
 
-    fn number(&self, name: &str) -> Result<Option<f64>> {
+    pub(super) fn number(&self, name: &str) -> Result<Option<f64>> {
         let Some(authored) = self.get(name) else { return Ok(None) };
         match authored.value.as_f64().filter(|v| v.is_finite()) {
             Some(number) => Ok(Some(number)),

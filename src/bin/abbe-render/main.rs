@@ -95,7 +95,7 @@ fn run(args: &Args, signals: &Signals, renders: &mut Vec<serde_json::Value>) -> 
     let outputs = outputs(args, &plans)?;
     for (plan, output) in plans.iter().zip(&outputs) {
         let progress = Reporter::new(output, args.quiet);
-        let control = Control { cancel: &signals.stop, progress: &|p| progress.report(p) };
+        let control = Control { cancel: &signals.stop, progress: &|p| progress.report(p), pass: None };
         let rendered = render::render(&scene, plan, &registry, &control)?;
         progress.close();
         let statistics = &rendered.statistics;

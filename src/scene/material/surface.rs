@@ -9,7 +9,7 @@ use crate::optics::Dispersion;
 use crate::scene::description::Shader;
 use crate::spectrum::reflectance::Reflectance;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
-use crate::texture::{Bundle, MAX_RESULTS, Register};
+use crate::texture::{Bundle, Register};
 
 use super::Conductor;
 use super::appearance::UNSTATED;
@@ -189,7 +189,7 @@ enum Source<T> {
     LookedUp(usize),
 }
 
-type Results = [[f32; 4]; MAX_RESULTS];
+type Results = [[f32; 4]];
 
 impl Number {
     fn at(&self, results: &Results) -> f32 {
@@ -219,6 +219,7 @@ enum Tint {
 }
 
 impl Tint {
+    /// Of a constant.
     fn of([r, g, b, _]: [f32; 4]) -> Self {
         let rgb = [r, g, b].map(|x| within(x, 0.0, 1.0));
         if rgb.iter().all(|&x| x >= 1.0) {
@@ -226,7 +227,7 @@ impl Tint {
         } else if rgb.iter().all(|&x| x <= 0.0) {
             Self::Black
         } else {
-            Self::Reflectance(Reflectance::of_color(rgb))
+            Self::Reflectance(Reflectance::exact(rgb.map(f64::from)))
         }
     }
 
@@ -235,7 +236,10 @@ impl Tint {
             Self::Black => SampledSpectrum::ZERO,
             Self::White => SampledSpectrum::ONE,
             Self::Reflectance(reflectance) => reflectance.at(wavelengths),
-            Self::LookedUp(i) => Self::of(results[*i]).at(results, wavelengths),
+            Self::LookedUp(i) => {
+                let [r, g, b, _] = results[*i];
+                Reflectance::of_color([r, g, b]).at(wavelengths)
+            }
         }
     }
 }
@@ -442,8 +446,12 @@ impl Surface {
             None => Emission::Of(Source::LookedUp(c.result(layers.emission))),
         };
         let transmission = c.share(layers.transmission);
-        // Without an inside, light that passes goes straight on.
-        let thin_walled = layers.thin_walled || (!matches!(index, IndexOf::Media) && !transmission.is_zero());
+        let diffuse_transmission = c.tint(layers.diffuse_transmission);
+        // Without an inside, light that passes goes straight on; where none passes, there is no wall.
+        let thin_walled = match transmission.is_zero() {
+            true => layers.thin_walled && diffuse_transmission != Tint::Black,
+            false => layers.thin_walled || !matches!(index, IndexOf::Media),
+        };
         let index = match index {
             IndexOf::Media => Index::Media,
             IndexOf::Wall(dispersion) => Index::Wall(dispersion.clone()),
@@ -459,7 +467,7 @@ impl Surface {
             specular_color: c.tint(specular_color),
             alpha: layers.alpha.map(|alpha| c.share(alpha)),
             schlick_f0: layers.schlick_f0.map(|f0| c.tint(f0)),
-            diffuse_transmission: c.tint(layers.diffuse_transmission),
+            diffuse_transmission,
             index,
             transmission,
             transmission_tint: if transmission.is_zero() { Tint::White } else { c.tint(layers.transmission_tint) },
@@ -495,6 +503,23 @@ impl Surface {
     /// Whether it emits anywhere.
     pub fn emits(&self) -> bool {
         self.emission != Emission::None
+    }
+
+    /// What it emits where that is the same all over: linear Rec. 709 in the shader's own unit.
+    pub fn constant_emission(&self) -> Option<[f32; 3]> {
+        match self.emission {
+            Emission::Of(Source::Constant(rgb)) => Some(rgb),
+            _ => None,
+        }
+    }
+
+    /// What it emits where its programs have these results.
+    pub(in crate::scene) fn emission(&self, results: &Results) -> [f32; 3] {
+        match self.emission {
+            Emission::None => [0.0; 3],
+            Emission::Of(Source::Constant(rgb)) => rgb,
+            Emission::Of(Source::LookedUp(i)) => std::array::from_fn(|k| within(results[i][k], 0.0, f32::MAX)),
+        }
     }
 
     /// At a hit. `results` are those of [`looked_up`](Self::looked_up) there, `interface` the media on the sides.
@@ -540,11 +565,7 @@ impl Surface {
             diffuse_transmission: tint(&self.diffuse_transmission),
             schlick_f0: self.schlick_f0.as_ref().map(tint),
         };
-        let emission = match self.emission {
-            Emission::None => [0.0; 3],
-            Emission::Of(Source::Constant(rgb)) => rgb,
-            Emission::Of(Source::LookedUp(i)) => std::array::from_fn(|k| within(results[i][k], 0.0, f32::MAX)),
-        };
+        let emission = self.emission(results);
         let normal_map = self.normal.map(|normal| match normal {
             Source::Constant(normal) => normal,
             Source::LookedUp(i) => [results[i][0], results[i][1], results[i][2]],
