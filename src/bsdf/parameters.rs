@@ -162,5 +162,6 @@ pub struct Film<const N: usize> {
     pub nanometers: SampledSpectrum<N>,
 }
 
-/// A GGX lobe narrower than this is treated as smooth: α = 0.03², as `scene::material::SMOOTH_ROUGHNESS`.
-pub const SMOOTH_ALPHA: f32 = 0.0009;
+/// A GGX lobe narrower than this is treated as smooth: the next number after α = 0.03², so that a roughness of
+/// `scene::material::SMOOTH_ROUGHNESS` itself is smooth, as it is for the specular chain.
+pub const SMOOTH_ALPHA: f32 = f32::from_bits(0.0009_f32.to_bits() + 1);

@@ -148,6 +148,8 @@ const fn light(name: &'static str, channels: &'static [&'static str], unit: &'st
 
 /// The beauty.
 pub const COLOR: &str = "color";
+/// The beauty without dispersion.
+pub const COLOR_CLEAN: &str = "color_clean";
 /// Variance of the beauty.
 pub const VARIANCE: &str = "variance";
 /// Samples that a pixel got.
@@ -168,11 +170,6 @@ pub const INTERNAL_TRANSMITTANCE: &str = "internal_transmittance";
 pub const MOTION: &str = "motion";
 /// Motion on screen of what is seen through glass, which is traced again at the frame and at the next one.
 pub const REFRACTED_MOTION: &str = "refracted_motion";
-
-/// Whether an AOV is a part of the beauty.
-pub fn is_part(aov: &Aov) -> bool {
-    matches!(aov.name, "diffuse" | "reflection" | "transmission" | "emission" | LIGHT_GROUP | LPE)
-}
 
 /// What an AOV has to be told with its name (`NAME:ARGUMENT`), in words; `None` if nothing.
 pub fn argument(aov: &Aov) -> Option<&'static str> {
@@ -197,6 +194,18 @@ pub static AOVS: &[Aov] = &[
         RADIANCE,
         "the beauty: light that reaches the camera, D65 with Y = 1 being (1, 1, 1), and the associated alpha",
     ),
+    light(
+        COLOR_CLEAN,
+        RGBA,
+        RADIANCE,
+        "the beauty as it is without any dispersion, from the same samples: the clean plate",
+    ),
+    light("diffuse", RGB, RADIANCE, "part of color that the first surface scatters diffusely"),
+    light("reflection", RGB, RADIANCE, "part of color that the first surface reflects, rough or smooth"),
+    light("transmission", RGB, RADIANCE, "part of color that the first surface lets through, rough or smooth"),
+    light("emission", RGB, RADIANCE, "part of color that is seen by itself: lights, domes, emitting surfaces"),
+    light(LIGHT_GROUP, RGB, RADIANCE, "part of color that the lights of a group send: light_group:NAME"),
+    light(LPE, RGB, RADIANCE, "part of color whose paths match a light path expression: lpe:EXPRESSION"),
     Aov {
         unit: "radiance²",
         merge: Merge::Variance,
@@ -218,17 +227,6 @@ pub static AOVS: &[Aov] = &[
         "radiance/nm",
         "mean radiance per nm in bins of the band, one channel each, called by the middle of its bin in nm",
     ),
-    light("diffuse", RGB, RADIANCE, "the part of color whose light the first surface scatters diffusely"),
-    light("reflection", RGB, RADIANCE, "the part of color that the first surface reflects, not diffusely"),
-    light("transmission", RGB, RADIANCE, "the part of color that the first surface transmits, not diffusely"),
-    light(
-        "emission",
-        RGB,
-        RADIANCE,
-        "the part of color that is seen directly: what surfaces, lights and the background emit",
-    ),
-    light(LIGHT_GROUP, RGB, RADIANCE, "the part of color that comes from the lights of a group"),
-    light(LPE, RGB, RADIANCE, "the part of color whose light paths match an expression"),
     mean(
         "ddirection_dlambda",
         XYZ,

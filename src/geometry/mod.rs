@@ -45,6 +45,7 @@ pub use mesh::{Mesh, MeshProblem, MeshReport};
 pub use motion::{Deformation, PlaceSamples, Pose, Track, are_increasing};
 pub(crate) use placed::is_invertible;
 pub use polygons::{Interpolation, NamedPrimvar, PolygonMesh, PrimvarView};
+pub(crate) use revolved::OnPiece;
 pub use revolved::{Cap, Revolved};
 pub use solid::{Axis, Solid};
 pub use sphere::Sphere;

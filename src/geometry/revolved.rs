@@ -5,11 +5,15 @@
 //! cut it is above or below the profile by comparison with one number, the height of the rim there. Sections only say
 //! where between two cuts the side changes, and cannot disagree with their neighbours whether it does.
 
+mod over_square;
+
 use glam::{DMat3, DVec3};
 
 use super::asphere::Asphere;
 use super::profile::{Form, Line, Section};
 use super::solid::{Axis, Bend, Border, Borders, Piece};
+
+pub(crate) use over_square::OnPiece;
 
 /// A solid of revolution about an axis of its object space.
 #[derive(Clone, Debug, PartialEq)]

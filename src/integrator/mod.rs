@@ -9,6 +9,7 @@ mod counters;
 pub mod differentials;
 mod frame;
 mod lanes;
+pub mod light_path;
 pub mod path;
 pub mod reference;
 mod screen_motion;
@@ -134,6 +135,10 @@ pub struct Task<'a> {
     pub samples: SampleRange,
     /// What the numbers of colours mean.
     pub color_space: ColorSpace,
+    /// How often light may be scattered.
+    pub depth_limits: path::DepthLimits,
+    /// Image file that is seen through glass, behind everything.
+    pub plate: Option<&'a str>,
     /// Full raster, pixels.
     pub resolution: [u32; 2],
     /// Whether something moves and vectors of motion are wanted; they are 0 if not.

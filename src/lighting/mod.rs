@@ -169,6 +169,7 @@ impl<'a> Lighting<'a> {
                     let (center, half) = (s.center(), s.half_extent());
                     (Bounds { min: center - half, max: center + half }, Cone::EVERYTHING)
                 }
+                Some(Piece::Ring(ring)) => (hull(&ring.box_corners()), Cone::EVERYTHING),
                 None => return number,
             };
             let emission_angle = std::f64::consts::FRAC_PI_2;
@@ -320,10 +321,13 @@ impl<'a> Lighting<'a> {
             Piece::Triangle(triangle) => triangle.sample(p, u)?,
             Piece::Sphere(ball) => (ball.sample(p, u)?, [0.0; 2]),
             Piece::Face(face) => (face.sample(p, u)?, [0.0; 2]),
+            Piece::Ring(ring) => (ring.sample(p, u)?, [0.0; 2]),
         };
         let hit = hit_at(object.instance, primitive, barycentric);
         let lights = (&self.lights[..], &self.colors[..]);
         let radiance = self.objects.radiance(self.view, lights, object, &hit, -wi, wavelengths);
+        // Rays meet no more of it than is there.
+        let radiance = radiance * object.presence(self.view, &hit);
         let light = self.id_of(object.source, &hit);
         let sample =
             LightSample { light, wi, distance, radiance, pdf: (probability * pdf_solid_angle) as f32, is_delta: false };
@@ -390,6 +394,7 @@ impl<'a> Lighting<'a> {
                 Some(Piece::Triangle(triangle)) => triangle.pdf(p, wi, distance),
                 Some(Piece::Sphere(ball)) => ball.pdf(p, wi),
                 Some(Piece::Face(face)) => face.pdf(p, distance),
+                Some(Piece::Ring(ring)) => ring.pdf(p, wi, distance),
                 None => 0.0,
             },
             Emitter::Light => match self.placed[number as usize].as_ref().map(|placed| &placed.form) {

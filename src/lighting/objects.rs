@@ -1,7 +1,7 @@
 //! Objects that shine: those of geometry lights, and those whose materials emit.
 //!
-//! Triangles, spheres, boxes and rectangles that stand still are sampled, piece by piece. What moves, and other analytic
-//! solids, shines where rays happen to meet it: sampling it would need its place at the time of each path.
+//! What stands still is sampled, piece by piece: triangles, spheres, the faces of boxes, the pieces of solids of revolution.
+//! What moves shines where rays happen to meet it: sampling it would need its place at the time of each path.
 //!
 //! A material emits to both sides, as surfaces do in Storm, Arnold and Cycles. A geometry light is an area light, whose normals point
 //! outwards: it shines to that side, so that its power is π times area times radiance.
@@ -9,12 +9,13 @@
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
-use super::color::{Color, Filter};
-use super::shape::{Ellipsoid, Rectangle, Triangle};
+use super::color::Color;
+use super::shape::{Ellipsoid, Rectangle, Ring, Rings, Triangle};
 use crate::diagnostics::Diagnostics;
 use crate::geometry::{Hit, Shape, Solid};
 use crate::light::{Ellipsoid as WorldEllipsoid, Light, MaterialSync, Shape as LightShape, White};
-use crate::scene::view::{Presence, View};
+use crate::scene::view::View;
+use crate::spectrum::reflectance::Unbounded;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
 
 /// More pieces than this are not sampled: a gigabyte of them.
@@ -49,6 +50,7 @@ enum Surface {
     Mesh { render_from_object: DAffine3, is_mirrored: bool },
     Sphere(Box<Ellipsoid>),
     Faces(Vec<Rectangle>),
+    Rings(Box<Rings>),
     Nothing,
 }
 
@@ -57,6 +59,7 @@ pub(super) enum Piece<'a> {
     Triangle(Triangle),
     Sphere(&'a Ellipsoid),
     Face(&'a Rectangle),
+    Ring(Ring<'a>),
 }
 
 /// A piece that may be chosen.
@@ -89,11 +92,9 @@ impl Objects {
         mut add: impl FnMut(u32, &Object, &NewPiece) -> u32,
     ) -> Self {
         let scene = view.scene;
-        let emission = |material: &crate::scene::material::Material| {
-            let [r, g, b, _] = material.appearance.emission.as_ref()?.as_constant()?;
-            Some(Color::over_d65([r, g, b].map(|x| f64::from(x.max(0.0)))))
-        };
-        let mut all = Self { list: Vec::new(), colors: scene.materials.iter().map(emission).collect() };
+        let constants = scene.materials.iter().map(|material| material.surface.constant_emission());
+        let color = |rgb: Option<[f32; 3]>| rgb.map(|rgb| Color::over_d65(rgb.map(f64::from)));
+        let mut all = Self { list: Vec::new(), colors: constants.map(color).collect() };
         let mut of_prim: Vec<(u32, u32, MaterialSync, bool)> = Vec::new();
         for (light, index) in lights.iter().zip(0..) {
             if let LightShape::Geometry(geometry) = &light.shape {
@@ -104,7 +105,7 @@ impl Objects {
         // Of several lights of a prim the first.
         of_prim.sort_by_key(|&(prim, light, ..)| (prim, light));
         of_prim.dedup_by_key(|entry| entry.0);
-        let emits: Vec<bool> = scene.materials.iter().map(|m| m.appearance.emission.is_some()).collect();
+        let emits: Vec<bool> = scene.materials.iter().map(|material| material.surface.emits()).collect();
         if of_prim.is_empty() && !emits.contains(&true) {
             return all;
         }
@@ -187,7 +188,7 @@ impl Objects {
                 let values = probes.iter().filter_map(|&place| {
                     let hit = hit_at(object.instance, primitive, place);
                     let glow = view.emission(&hit, view.material_id(&hit))?;
-                    Some(mean(std::array::from_fn(|i| base[i] * glow[i])))
+                    Some(mean(std::array::from_fn(|i| base[i] * f64::from(glow[i]))))
                 });
                 let values: Vec<f64> = values.collect();
                 if values.is_empty() { return None } else { values.iter().sum::<f64>() / values.len() as f64 }
@@ -220,12 +221,13 @@ impl Objects {
         if let Some(color) = &self.colors[material] {
             return Some(color.at(wavelengths));
         }
-        let filter = Filter::of(view.emission(hit, id)?);
+        let filter = Unbounded::of_color(view.emission(hit, id)?);
         let white = White::d65();
         Some(SampledSpectrum(wavelengths.nanometers().map(|nm| white.at(nm))) * filter.at(wavelengths))
     }
 
-    /// What an object emits at `hit` in the direction of travel `direction`, as what is sampled of it does.
+    /// What an object emits at `hit` in the direction of travel `direction`, as what is sampled of it does; where its surface is
+    /// only there in part, as the part that is there does.
     pub(super) fn radiance<const N: usize>(
         &self,
         view: &View<'_>,
@@ -236,21 +238,14 @@ impl Objects {
         wavelengths: &Wavelengths<N>,
     ) -> SampledSpectrum<N> {
         let id = view.material_id(hit);
-        let is_absent = || view.presence(hit, id) == Presence::Absent;
         match object.source {
-            Source::Material => {
-                let glow = self.glow(view, hit, id, wavelengths).filter(|_| !is_absent());
-                glow.unwrap_or(SampledSpectrum::ZERO)
-            }
+            Source::Material => self.glow(view, hit, id, wavelengths).unwrap_or(SampledSpectrum::ZERO),
             Source::Light { light, sync, scale } => {
                 let (light, color) = (&lights.0[light as usize], &lights.1[light as usize]);
                 let mut factor = light.shaped(direction).map(|x| scale * x);
-                if sync != MaterialSync::NoResponse && is_absent() {
-                    return SampledSpectrum::ZERO;
-                }
                 if sync == MaterialSync::GlowTintsLight {
                     let Some(glow) = view.emission(hit, id) else { return SampledSpectrum::ZERO };
-                    factor = std::array::from_fn(|i| factor[i] * glow[i]);
+                    factor = std::array::from_fn(|i| factor[i] * f64::from(glow[i]));
                 }
                 color.times(factor, wavelengths)
             }
@@ -259,6 +254,14 @@ impl Objects {
 }
 
 impl Object {
+    /// The share of its surface that is there at `hit`.
+    pub(super) fn presence(&self, view: &View<'_>, hit: &Hit) -> f32 {
+        match self.source {
+            Source::Light { sync: MaterialSync::NoResponse, .. } => 1.0,
+            _ => view.share_present(hit, view.material_id(hit)),
+        }
+    }
+
     /// Whether it shines to both sides.
     pub(super) fn is_two_sided(&self) -> bool {
         self.source == Source::Material
@@ -283,7 +286,7 @@ impl Object {
             Shape::Solid(solid @ (Solid::Cuboid(_) | Solid::Rectangle(_))) => {
                 Surface::Faces(faces(solid, &place, is_two_sided))
             }
-            Shape::Solid(Solid::Revolved(_)) => Surface::Nothing,
+            Shape::Solid(Solid::Revolved(_)) => Surface::Rings(Box::new(Rings::new(&place))),
         };
     }
 
@@ -293,6 +296,10 @@ impl Object {
             Surface::Nothing => 0,
             Surface::Sphere(_) => 1,
             Surface::Faces(faces) => faces.len(),
+            Surface::Rings(_) => match view.scene.objects.placed(self.instance, 0.0).0 {
+                Shape::Solid(Solid::Revolved(solid)) => solid.piece_count() as usize,
+                _ => 0,
+            },
             Surface::Mesh { .. } => match view.scene.objects.placed(self.instance, 0.0).0 {
                 Shape::Mesh(mesh) => mesh.len(),
                 _ => 0,
@@ -301,11 +308,17 @@ impl Object {
     }
 
     /// The piece that is a primitive.
-    pub(super) fn piece(&self, view: &View<'_>, primitive: u32) -> Option<Piece<'_>> {
+    pub(super) fn piece<'b>(&'b self, view: &'b View<'_>, primitive: u32) -> Option<Piece<'b>> {
         match &self.surface {
             Surface::Nothing => None,
             Surface::Sphere(sphere) => Some(Piece::Sphere(sphere)),
             Surface::Faces(faces) => faces.get(primitive as usize).map(Piece::Face),
+            Surface::Rings(rings) => match view.scene.objects.placed(self.instance, 0.0).0 {
+                Shape::Solid(Solid::Revolved(solid)) => {
+                    Some(Piece::Ring(Ring::new(solid, primitive, rings, self.is_two_sided())))
+                }
+                _ => None,
+            },
             Surface::Mesh { render_from_object, is_mirrored } => {
                 let (Shape::Mesh(mesh), _) = view.scene.objects.placed(self.instance, 0.0) else { return None };
                 let local = mesh.corners(primitive, 0.0);
@@ -342,12 +355,17 @@ impl Piece<'_> {
             Self::Triangle(triangle) => triangle.area(),
             Self::Sphere(sphere) => sphere.area(),
             Self::Face(face) => face.area(),
+            Self::Ring(ring) => ring.area(),
         }
     }
 
     /// Intensity where it is brightest over radiance times area.
     fn intensity_factor(&self) -> f64 {
-        if matches!(self, Self::Sphere(_)) { 0.25 } else { 1.0 }
+        match self {
+            Self::Triangle(_) | Self::Face(_) => 1.0,
+            // The mean over all directions.
+            Self::Sphere(_) | Self::Ring(_) => 0.25,
+        }
     }
 }
 
@@ -372,7 +390,7 @@ fn faces(solid: &Solid, place: &DAffine3, is_two_sided: bool) -> Vec<Rectangle> 
     (0..3).flat_map(|i| [-1.0, 1.0].map(|sign| face(i, sign, sign * axis(i)))).collect()
 }
 
-/// Area of an object in the world at the scene's own time; 0 of solids that have none here.
+/// Area of an object in the world at the scene's own time.
 fn area(view: &View<'_>, instance: u32) -> f64 {
     let (shape, place) = view.scene.objects.placed(instance, 0.0);
     match shape {
@@ -386,6 +404,9 @@ fn area(view: &View<'_>, instance: u32) -> f64 {
         Shape::Solid(solid @ (Solid::Cuboid(_) | Solid::Rectangle(_))) => {
             faces(solid, &place, true).iter().map(Rectangle::area).sum()
         }
-        Shape::Solid(Solid::Revolved(_)) => 0.0,
+        Shape::Solid(Solid::Revolved(solid)) => {
+            let rings = Rings::new(&place);
+            (0..solid.piece_count()).map(|primitive| Ring::new(solid, primitive, &rings, true).area()).sum()
+        }
     }
 }

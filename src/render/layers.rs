@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::film::aov::{self, Aov, Family, SampleType};
 use crate::film::spectral::{self, Bins};
 use crate::integrator::Registry;
+use crate::integrator::light_path::Expression;
 use crate::scene::description::{Product, Var};
 
 /// What `differentials` writes when nobody says what to write.
@@ -106,17 +107,20 @@ pub(super) fn layers(
             let asked = Asked::of(text);
             let place = format!("--aov {text}");
             let aov = find(asked.aov).ok_or_else(|| Error::usage(&place, unavailable(asked.aov)))?;
-            let layer = asked.layer(aov, names.len() == 1).map_err(|problem| Error::usage(&place, problem))?;
-            let is_known = |known: &PlannedLayer| known.name == layer.name && known.argument == layer.argument;
-            if layers.iter().any(|known| known.name == layer.name && !is_known(known)) {
+            let mut layer = asked.layer(aov, names.len() == 1).map_err(|problem| Error::usage(&place, problem))?;
+            if layers.iter().any(|known| known.aov.name == layer.aov.name && known.argument == layer.argument) {
+                continue;
+            }
+            if asked.name.is_none() && !layer.argument.is_empty() {
+                layer.name = unused_name(&layers, layer.name);
+            }
+            if layers.iter().any(|known| known.name == layer.name) {
                 return Err(Error::usage(
                     place,
-                    format!("the layer '{}' is asked for twice: give it a NAME=", layer.name),
+                    format!("the layer '{}' is asked for twice: give it another NAME=", layer.name),
                 ));
             }
-            if !layers.iter().any(is_known) {
-                layers.push(layer);
-            }
+            layers.push(layer);
         }
         if layers.is_empty() {
             return Err(Error::usage("--aov", "no AOV is asked for: name one, or leave the option out"));
@@ -229,13 +233,19 @@ impl<'a> Asked<'a> {
             (Some(wanted), "") => return Err(format!("'{0}' needs an argument: {0}:ARGUMENT, {wanted}", aov.name)),
             (Some(_), argument) => argument.to_owned(),
         };
-        if aov.name == aov::SPECTRAL {
-            Bins::parse(&argument).map_err(|error| error.to_string())?;
+        match aov.name {
+            aov::SPECTRAL => {
+                Bins::parse(&argument).map_err(|error| error.to_string())?;
+            }
+            aov::LIGHT_GROUP | aov::LPE => {
+                Expression::of_aov(aov.name, &argument)?;
+            }
+            _ => {}
         }
         let name = match (self.name, aov.name) {
             (Some(name), _) => layer_name(aov.name, name, ""),
             (None, aov::SPECTRAL) if is_alone => spectral::EMISSION.to_owned(),
-            (None, aov::LIGHT_GROUP | aov::LPE) => format!("{}_{}", aov.name, plain_letters(&argument)),
+            (None, aov::LIGHT_GROUP) => format!("{}_{}", aov.name, plain_letters(&argument)),
             (None, _) => plain.name,
         };
         let aov = with_bins(aov, &argument, &name);
@@ -251,10 +261,19 @@ fn with_bins(aov: &'static Aov, argument: &str, name: &str) -> &'static Aov {
     }
 }
 
-/// `text` with every run of what no layer's name should have as one `_`.
+/// `text` with an underscore for everything that no layer's name should have.
 fn plain_letters(text: &str) -> String {
-    let parts = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').filter(|part| !part.is_empty());
-    parts.collect::<Vec<_>>().join("_")
+    text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+}
+
+/// `wanted`, or the first of `wanted_2`, `wanted_3` … that no layer has.
+fn unused_name(layers: &[PlannedLayer], wanted: String) -> String {
+    let is_free = |name: &str| layers.iter().all(|layer| layer.name != name);
+    if is_free(&wanted) {
+        return wanted;
+    }
+    let mut names = (2..).map(|i| format!("{wanted}_{i}"));
+    names.find(|name| is_free(name)).expect("there are fewer layers than numbers")
 }
 
 /// The integrator that nobody chose: with light transport if some AOV asks for light.

@@ -176,6 +176,8 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
         sampler: Sampler::new(plan.samples.total, plan.seed)?.over_time(plan.shutter.is_some()).filtered(&plan.filter),
         samples: plan.samples,
         color_space: plan.color_space,
+        depth_limits: plan.depth_limits,
+        plate: plan.plate.as_deref(),
         resolution: plan.resolution,
         motion_vectors: plan.motion_vectors,
     };

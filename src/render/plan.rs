@@ -23,6 +23,7 @@ use crate::film::metadata::Attribute;
 use crate::film::spectral::Bins;
 use crate::film::{SampleRange, Window};
 use crate::geometry::Shape;
+use crate::integrator::path::DepthLimits;
 use crate::integrator::transmittance::absorbs;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
 use crate::optics::dispersion::Dispersion;
@@ -122,6 +123,10 @@ pub struct Plan {
     pub integrator: String,
     /// Layers in the film's order.
     pub layers: Vec<PlannedLayer>,
+    /// How often light may be scattered.
+    pub depth_limits: DepthLimits,
+    /// Image file that is seen through glass, behind everything.
+    pub plate: Option<String>,
     /// Wavelengths.
     pub optics: Optics,
     /// What the numbers of colours of light mean.
@@ -231,6 +236,8 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         texture_memory: textures::memory(request)?,
         integrator: integrator.name().to_owned(),
         layers,
+        depth_limits: request.depth_limits,
+        plate: request.plate.clone(),
         optics,
         color_space,
         needs,

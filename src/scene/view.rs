@@ -13,7 +13,7 @@ use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
 use crate::ray::LocalSurface;
 use crate::spectrum::{Wavelength, Wavelengths};
-use crate::texture::{MAX_RESULTS, Program};
+use crate::texture::Program;
 
 /// The direction of the one fixed ray that finds the media around the camera: no axis or diagonal that scenes are built on.
 const PARITY_DIRECTION: DVec3 = DVec3::new(0.267_261_241_912_424_4, 0.534_522_483_824_848_8, 0.801_783_725_737_273_2);
@@ -156,10 +156,9 @@ impl<'a> View<'a> {
     }
 
     /// What the material `id` of the surface at `hit` emits: linear Rec. 709 by luminance; `None` where it has no emission.
-    pub fn emission(&self, hit: &Hit, id: u32) -> Option<[f64; 3]> {
-        let program = self.scene.materials[id.checked_sub(1)? as usize].appearance.emission.as_ref()?;
-        let [r, g, b, _] = self.evaluate(program, hit);
-        Some([r, g, b].map(|x| if x > 0.0 && x.is_finite() { f64::from(x) } else { 0.0 }))
+    pub fn emission(&self, hit: &Hit, id: u32) -> Option<[f32; 3]> {
+        let surface = self.surface_of(id);
+        surface.emits().then(|| self.with_results(surface, hit, |results| surface.emission(results)))
     }
 
     /// Whether the surface at `hit`, whose material is `id`, is as its material says, something else, or not there.
@@ -192,7 +191,7 @@ impl<'a> View<'a> {
         interface: Interface<N>,
     ) -> SurfaceAt<N> {
         let surface = self.surface_of(id);
-        surface.at(&self.looked_up(surface, hit), wavelengths, interface)
+        self.with_results(surface, hit, |results| surface.at(results, wavelengths, interface))
     }
 
     /// The frame of what [`surface`](Self::surface) said of `hit`, met at `time`: its normal after the normal map, on the side of
@@ -212,7 +211,7 @@ impl<'a> View<'a> {
     /// [`SurfaceAt::presence`], for rays that only ask what is in their way.
     pub fn share_present(&self, hit: &Hit, id: u32) -> f32 {
         let surface = self.surface_of(id);
-        if surface.is_present() { 1.0 } else { surface.presence(&self.looked_up(surface, hit)) }
+        if surface.is_present() { 1.0 } else { self.with_results(surface, hit, |results| surface.presence(results)) }
     }
 
     fn surface_of(&self, id: u32) -> &'a Surface {
@@ -222,9 +221,12 @@ impl<'a> View<'a> {
         }
     }
 
-    fn looked_up(&self, surface: &Surface, hit: &Hit) -> [[f32; 4]; MAX_RESULTS] {
-        let programs = surface.looked_up();
-        programs.map_or([[0.0; 4]; MAX_RESULTS], |programs| programs.at(&self.scene.textures, self.primvars(hit)))
+    /// `f` of what the programs of a surface find at `hit`; none run where everything is constant.
+    fn with_results<R>(&self, surface: &Surface, hit: &Hit, f: impl FnOnce(&[[f32; 4]]) -> R) -> R {
+        match surface.looked_up() {
+            Some(programs) => f(&programs.at(&self.scene.textures, self.primvars(hit))),
+            None => f(&[]),
+        }
     }
 
     fn evaluate(&self, program: &Program, hit: &Hit) -> [f32; 4] {
@@ -322,3 +324,6 @@ impl Media {
         self.of(material_id.checked_sub(1).map(MediumId))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,6 +7,7 @@
 mod disk;
 mod ellipsoid;
 mod rectangle;
+mod ring;
 mod triangle;
 mod tube;
 
@@ -15,6 +16,7 @@ use glam::{DMat3, DVec3};
 pub(super) use disk::Disk;
 pub(super) use ellipsoid::Ellipsoid;
 pub(super) use rectangle::Rectangle;
+pub(super) use ring::{Ring, Rings};
 pub(super) use triangle::Triangle;
 pub(super) use tube::{Line, Tube};
 

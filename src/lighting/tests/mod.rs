@@ -1,5 +1,6 @@
 //! Lights against closed forms, quadrature and each other.
 
+mod dome;
 mod shapes;
 mod tree;
 

@@ -115,7 +115,7 @@ fn shape(
         LightShape::Distant { angle } => {
             let toward = world_from_light.matrix3.z_axis.normalize();
             let distant = Distant { toward, half_angle: 0.5 * angle.clamp(0.0, 360.0).to_radians() };
-            let size = distant.size_factor();
+            let size = if light.normalize { distant.size_factor() } else { 1.0 };
             return Ok((Shape::Distant(distant), size));
         }
         LightShape::Dome { texture, ref format, ref pole_axis, .. } => {

@@ -97,6 +97,12 @@ const DIALECTS: &[&dyn Dialect] = &[
     &pxr_surface::PxrSurface,
 ];
 
+/// Every shader identifier that is understood.
+#[cfg(test)]
+pub(super) fn every_id() -> impl Iterator<Item = &'static str> {
+    DIALECTS.iter().flat_map(|dialect| dialect.ids()).copied()
+}
+
 /// A shader whose dialect is understood.
 pub(super) struct Terminal<'a> {
     dialect: &'static dyn Dialect,
