@@ -13,6 +13,7 @@ use super::chain::{Counters, Follower};
 use super::differentials::{self, Differentials};
 use super::lanes::Laws;
 use super::{Integrator, PreparedIntegrator, Task, Worker};
+use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 use crate::film::aov::{AOVS, Aov, Family};
 use crate::film::pixel::PixelAccumulator;
@@ -77,6 +78,10 @@ impl PreparedIntegrator for Prepared<'_> {
         } else {
             Box::new(PathWorker::<LANES, false>::new(self))
         }
+    }
+
+    fn diagnostics(&self) -> Diagnostics {
+        self.lighting.diagnostics().clone()
     }
 }
 

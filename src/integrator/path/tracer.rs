@@ -64,21 +64,23 @@ struct State<const N: usize> {
     throughput: SampledSpectrum<N>,
     r: SampledSpectrum<N>,
     vertex: Option<Vertex<N>>,
+    /// The object of the last event, whose light links count.
+    object: Option<u32>,
     radiance: SampledSpectrum<N>,
 }
 
 impl<const N: usize> State<N> {
     /// Adds the light that the path's ray has met.
     fn meet<const DISPERSIVE: bool>(&mut self, lighting: &Lighting<'_>, direction: DVec3, met: &LightHit<N>) {
+        if self.object.is_some_and(|object| !lighting.is_linked(met.light, object)) {
+            return;
+        }
         let Some(vertex) = &self.vertex else {
             // Nothing but this way leads there.
             let by_lanes = if DISPERSIVE { 1.0 / self.r.mean() } else { 1.0 };
             self.radiance += self.throughput * met.radiance * by_lanes;
             return;
         };
-        if !lighting.is_linked(met.light, vertex.receiver.object) {
-            return;
-        }
         let pdf = lighting.pdf(&vertex.receiver, direction, met);
         let mut seen = met.radiance;
         if let Some(light) = lighting.light(met.light)
@@ -134,6 +136,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             throughput: SampledSpectrum::ONE,
             r: SampledSpectrum::ONE,
             vertex: None,
+            object: None,
             radiance: SampledSpectrum::ZERO,
         };
         let mut alpha = 0.0;
@@ -208,6 +211,10 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         if let Some(emitted) = self.lighting.emitted(&walk.ray, &met.hit, &state.wavelengths) {
             state.meet::<DISPERSIVE>(self.lighting, direction, &emitted);
         }
+        if self.lighting.replaces_material(&met.hit) {
+            return false;
+        }
+        state.object = Some(met.hit.instance);
         // The shading normal decides how light is scattered, the geometric one which side it is on.
         let toward = |n: DVec3| if direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
         let n_g = toward(met.surface.n_g);
