@@ -148,10 +148,14 @@ const fn light(name: &'static str, channels: &'static [&'static str], unit: &'st
 
 /// The beauty.
 pub const COLOR: &str = "color";
+/// The beauty without dispersion.
+pub const COLOR_CLEAN: &str = "color_clean";
 /// Variance of the beauty.
 pub const VARIANCE: &str = "variance";
 /// Samples that a pixel got.
 pub const SAMPLE_COUNT: &str = "sample_count";
+/// AOVs of which there can be many, told apart by what stands after a colon.
+pub const TAKES_ARGUMENT: &[&str] = &["light_group", "lpe"];
 /// What colours of light are measured in.
 const RADIANCE: &str = "radiance";
 
@@ -176,6 +180,18 @@ pub static AOVS: &[Aov] = &[
         RADIANCE,
         "the beauty: light that reaches the camera, D65 with Y = 1 being (1, 1, 1), and the associated alpha",
     ),
+    light(
+        COLOR_CLEAN,
+        RGBA,
+        RADIANCE,
+        "the beauty as it is without any dispersion, from the same samples: the clean plate",
+    ),
+    light("diffuse", RGB, RADIANCE, "part of color that the first surface scatters diffusely"),
+    light("reflection", RGB, RADIANCE, "part of color that the first surface reflects, rough or smooth"),
+    light("transmission", RGB, RADIANCE, "part of color that the first surface lets through, rough or smooth"),
+    light("emission", RGB, RADIANCE, "part of color that is seen by itself: lights, domes, emitting surfaces"),
+    light("light_group", RGB, RADIANCE, "part of color that the lights of a group send: light_group:NAME"),
+    light("lpe", RGB, RADIANCE, "part of color whose paths match a light path expression: lpe:EXPRESSION"),
     Aov {
         unit: "radiance²",
         merge: Merge::Variance,

@@ -9,6 +9,7 @@ mod counters;
 pub mod differentials;
 mod frame;
 mod lanes;
+pub mod light_path;
 pub mod path;
 pub mod reference;
 mod screen_motion;
@@ -123,6 +124,8 @@ pub struct Task<'a> {
     pub camera: &'a Camera,
     /// One AOV per layer, in the film's order.
     pub aovs: &'a [&'static Aov],
+    /// What each layer's AOV asks for besides: a light path expression, a light group; empty if nothing.
+    pub arguments: &'a [String],
     /// What the layers need.
     pub needs: Needs,
     /// Wavelengths.
@@ -133,6 +136,10 @@ pub struct Task<'a> {
     pub samples: SampleRange,
     /// What the numbers of colours mean.
     pub color_space: ColorSpace,
+    /// How often light may be scattered.
+    pub depth_limits: path::DepthLimits,
+    /// Image file that is seen through glass, behind everything.
+    pub plate: Option<&'a str>,
     /// Full raster, pixels.
     pub resolution: [u32; 2],
     /// Whether something moves and vectors of motion are wanted; they are 0 if not.

@@ -11,6 +11,7 @@ use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::{self, Aov, Family, SampleType};
 use crate::integrator::Registry;
+use crate::integrator::light_path::Expression;
 use crate::scene::description::{Product, Var};
 
 /// What `differentials` writes when nobody says what to write.
@@ -41,6 +42,9 @@ pub struct PlannedLayer {
     /// Its AOV.
     #[serde(serialize_with = "aov_name")]
     pub aov: &'static Aov,
+    /// What the AOV asks for besides, a light group or a light path expression; empty if nothing.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub argument: String,
     /// EXR layer name; empty for bare channels.
     pub name: String,
     /// Stored in 16 bits.
@@ -53,7 +57,7 @@ fn aov_name<S: serde::Serializer>(aov: &&'static Aov, serializer: S) -> Result<S
 
 impl PlannedLayer {
     fn plain(aov: &'static Aov) -> Self {
-        Self { aov, name: layer_name(aov.name, aov.name, ""), half: aov.is_half_by_default() }
+        Self { aov, argument: String::new(), name: layer_name(aov.name, aov.name, ""), half: aov.is_half_by_default() }
     }
 }
 
@@ -92,11 +96,21 @@ pub(super) fn layers(
     };
     let mut layers: Vec<PlannedLayer> = Vec::new();
     if let Some(names) = &request.aovs {
-        for name in names {
-            let aov = find(name).ok_or_else(|| Error::usage(format!("--aov {name}"), unavailable(name)))?;
-            if layers.iter().all(|layer| layer.aov.name != aov.name) {
-                layers.push(PlannedLayer::plain(aov));
+        for asked in names {
+            let place = || format!("--aov {asked}");
+            let (own_name, asked) = named(asked);
+            let (name, argument) = with_argument(asked);
+            let aov = find(name).ok_or_else(|| Error::usage(place(), unavailable(name)))?;
+            check_argument(aov, argument).map_err(|problem| Error::usage(place(), problem))?;
+            if layers.iter().any(|layer| layer.aov.name == aov.name && layer.argument == argument) {
+                continue;
             }
+            let mut layer = PlannedLayer { argument: argument.to_owned(), ..PlannedLayer::plain(aov) };
+            if !argument.is_empty() {
+                let wanted = own_name.map_or_else(|| argument_name(aov, argument), str::to_owned);
+                layer.name = unused_name(&layers, wanted);
+            }
+            layers.push(layer);
         }
         if layers.is_empty() {
             return Err(Error::usage("--aov", "no AOV is asked for: name one, or leave the option out"));
@@ -111,10 +125,19 @@ pub(super) fn layers(
                 continue;
             }
         };
+        let (source, argument) = source;
         let Some(aov) = find(source) else {
             diagnostics.warn("unavailable-render-var", &var.path, format!("{}: it is left out", unavailable(source)));
             continue;
         };
+        if let Err(problem) = check_argument(aov, argument) {
+            diagnostics.warn(
+                "unavailable-render-var",
+                &var.path,
+                format!("asks for '{argument}', which {problem}: it is left out"),
+            );
+            continue;
+        }
         let name = match text(var, "name") {
             "" => var.name.as_str(),
             name => name,
@@ -131,10 +154,11 @@ pub(super) fn layers(
                 ),
             ));
         }
-        layers.push(PlannedLayer { aov, name, half });
+        layers.push(PlannedLayer { aov, argument: argument.to_owned(), name, half });
     }
     if layers.is_empty() {
-        layers = DEFAULT_AOVS.iter().filter_map(|name| find(name)).map(PlannedLayer::plain).collect();
+        let default = if integrator.transports_light() { &[BEAUTY][..] } else { DEFAULT_AOVS };
+        layers = default.iter().filter_map(|name| find(name)).map(PlannedLayer::plain).collect();
         if layers.is_empty() {
             layers = offered.into_iter().map(PlannedLayer::plain).collect();
         }
@@ -144,20 +168,65 @@ pub(super) fn layers(
 
 /// The integrator that nobody chose: with light transport if some AOV asks for light.
 fn default_integrator(request: &Request, product: Option<&Product>) -> &'static str {
-    let is_light = |name: &str| aov::find(name).is_some_and(|aov| aov.family == Family::Transport);
+    let is_light =
+        |asked: &str| aov::find(with_argument(named(asked).1).0).is_some_and(|aov| aov.family == Family::Transport);
     let asks = match &request.aovs {
         Some(names) => names.iter().any(|name| is_light(name)),
-        None => product.is_some_and(|p| p.vars.iter().any(|var| source(var).is_ok_and(is_light))),
+        None => product.is_some_and(|p| p.vars.iter().any(|var| source(var).is_ok_and(|(name, _)| is_light(name)))),
     };
     if asks { "path" } else { "differentials" }
+}
+
+/// `LAYER=AOV`: a name of its own for an AOV with an argument.
+fn named(asked: &str) -> (Option<&str>, &str) {
+    match asked.split_once('=') {
+        Some((name, rest)) if !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_') => {
+            (Some(name), rest)
+        }
+        _ => (None, asked),
+    }
+}
+
+/// `AOV:ARGUMENT`: light groups and light path expressions.
+fn with_argument(asked: &str) -> (&str, &str) {
+    match asked.split_once(':') {
+        Some((name, argument)) if aov::TAKES_ARGUMENT.contains(&name) => (name, argument),
+        _ => (asked, ""),
+    }
+}
+
+fn check_argument(aov: &Aov, argument: &str) -> Result<(), String> {
+    match aov::TAKES_ARGUMENT.contains(&aov.name) {
+        true => Expression::of_aov(aov.name, argument).map(drop),
+        false => Ok(()),
+    }
+}
+
+/// What a layer with an argument is called: after the light group, or just by its AOV.
+fn argument_name(aov: &Aov, argument: &str) -> String {
+    if aov.name != "light_group" {
+        return aov.name.to_owned();
+    }
+    let clean = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    format!("{}_{}", aov.name, argument.chars().map(clean).collect::<String>())
+}
+
+/// `wanted`, or the first of `wanted_2`, `wanted_3` … that no layer has.
+fn unused_name(layers: &[PlannedLayer], wanted: String) -> String {
+    let is_free = |name: &str| layers.iter().all(|layer| layer.name != name);
+    if is_free(&wanted) {
+        return wanted;
+    }
+    let mut names = (2..).map(|i| format!("{wanted}_{i}"));
+    names.find(|name| is_free(name)).expect("there are fewer layers than numbers")
 }
 
 fn text<'a>(var: &'a Var, name: &str) -> &'a str {
     var.driver.get(name).and_then(|a| a.value.as_str()).unwrap_or("")
 }
 
-/// The AOV that a variable names, or why it names none. Hydra's prefixes say what `sourceType` says too.
-fn source(var: &Var) -> Result<&str, String> {
+/// The AOV that a variable names and its argument, or why it names none. Hydra's prefixes say what `sourceType` says too.
+fn source(var: &Var) -> Result<(&str, &str), String> {
     let name = if var.source_name.is_empty() { &var.name } else { &var.source_name };
     let (kind, name) = match name.split_once(':') {
         Some(("primvars", rest)) => ("primvar", rest),
@@ -166,16 +235,14 @@ fn source(var: &Var) -> Result<&str, String> {
     };
     match kind {
         "primvar" => match aov::canonical_name(name) {
-            "uv" => Ok("uv"),
-            "normals" | "normal" => Ok("normal"),
+            "uv" => Ok(("uv", "")),
+            "normals" | "normal" => Ok(("normal", "")),
             _ => Err(format!(
                 "asks for the primvar '{name}', and of primvars only texture coordinates (st) and normals are written"
             )),
         },
-        "lpe" if aov::canonical_name(name) != BEAUTY => {
-            Err(format!("asks for the light path expression '{name}', which needs light transport"))
-        }
-        _ => Ok(name),
+        "lpe" if aov::canonical_name(name) != BEAUTY => Ok(("lpe", name)),
+        _ => Ok(with_argument(name)),
     }
 }
 

@@ -164,15 +164,19 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
     let view = view(scene, plan, &camera);
     textures::prepare(scene, &plan.needs, plan.texture_memory)?;
     let aovs: Vec<&'static Aov> = plan.layers.iter().map(|layer| layer.aov).collect();
+    let arguments: Vec<String> = plan.layers.iter().map(|layer| layer.argument.clone()).collect();
     let task = Task {
         view: &view,
         camera: &camera,
         aovs: &aovs,
+        arguments: &arguments,
         needs: plan.needs,
         optics: plan.optics,
         sampler: Sampler::new(plan.samples.total, plan.seed)?.over_time(plan.shutter.is_some()).filtered(&plan.filter),
         samples: plan.samples,
         color_space: plan.color_space,
+        depth_limits: plan.depth_limits,
+        plate: plan.plate.as_deref(),
         resolution: plan.resolution,
         motion_vectors: plan.motion_vectors,
     };

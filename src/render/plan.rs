@@ -22,6 +22,7 @@ use crate::film::aov::{Aov, INTERNAL_TRANSMITTANCE};
 use crate::film::metadata::Attribute;
 use crate::film::{SampleRange, Window};
 use crate::geometry::Shape;
+use crate::integrator::path::DepthLimits;
 use crate::integrator::transmittance::absorbs;
 use crate::integrator::{Columns, Integrator, Needs, Optics, Registry};
 use crate::optics::dispersion::Dispersion;
@@ -121,6 +122,10 @@ pub struct Plan {
     pub integrator: String,
     /// Layers in the film's order.
     pub layers: Vec<PlannedLayer>,
+    /// How often light may be scattered.
+    pub depth_limits: DepthLimits,
+    /// Image file that is seen through glass, behind everything.
+    pub plate: Option<String>,
     /// Wavelengths.
     pub optics: Optics,
     /// What the numbers of colours of light mean.
@@ -230,6 +235,8 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         texture_memory: textures::memory(request)?,
         integrator: integrator.name().to_owned(),
         layers,
+        depth_limits: request.depth_limits,
+        plate: request.plate.clone(),
         optics,
         color_space,
         needs,

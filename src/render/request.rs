@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::integrator::path::DepthLimits;
+
 /// A request; what it leaves open is taken from the stage's product, then its settings, then the defaults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -38,6 +40,10 @@ pub struct Request {
     pub band: Option<[f64; 2]>,
     /// Multiplies all dispersion: 0 none, 1 physical.
     pub dispersion_scale: Option<f64>,
+    /// How often light may be scattered: unlimited unless asked.
+    pub depth_limits: DepthLimits,
+    /// Image file that is seen through glass, behind everything.
+    pub plate: Option<String>,
     /// False closes all shutters at the frame.
     pub motion_blur: Option<bool>,
     /// Seed of the sample positions.

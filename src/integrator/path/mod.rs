@@ -5,23 +5,29 @@
 //! Next-event estimation and the directions of the BSDFs are combined by the balance heuristic, over all wavelengths that could have
 //! made the path. All other AOVs are those of `differentials`, in the same pass and with the same bits.
 
+mod depth;
+mod ledger;
+mod plate;
+mod tracer;
+
 use std::ops::Range;
 
-mod tracer;
+use glam::{DMat3, DVec3};
 
 use super::chain::{Counters, Follower};
 use super::differentials::{self, Differentials};
 use super::lanes::Laws;
+use super::light_path::Expression;
 use super::{Integrator, PreparedIntegrator, Task, Worker};
 use crate::diagnostics::Diagnostics;
-use crate::error::Result;
-use crate::film::aov::{AOVS, Aov, Family};
+use crate::error::{Error, Result};
+use crate::film::aov::{AOVS, Aov, COLOR, COLOR_CLEAN, Family, SAMPLE_COUNT, VARIANCE};
 use crate::film::pixel::PixelAccumulator;
 use crate::lighting::Lighting;
-use crate::spectrum::sensor;
-use crate::spectrum::{LANES, visible};
-use glam::{DMat3, DVec3};
-use tracer::Tracer;
+use crate::spectrum::{LANES, sensor, visible};
+pub use depth::DepthLimits;
+use plate::Plate;
+use tracer::{Setting, Tracer};
 
 /// The integrator; it has no settings of its own.
 #[derive(Clone, Copy, Debug)]
@@ -54,20 +60,62 @@ struct Prepared<'a> {
     follower: Follower<'a>,
     lighting: Lighting<'a>,
     laws: Laws<'a>,
+    /// Without any dispersion, if the clean beauty is asked for.
+    clean: Option<Laws<'a>>,
+    plate: Option<Plate>,
+    /// Of the layers that show parts of the light, in the order of `parts`.
+    expressions: Vec<Expression>,
+    /// Layers of the parts.
+    parts: Vec<usize>,
+    /// Layers of the clean beauty.
+    clean_layers: Vec<usize>,
     /// Everything that is no light; `None` if nothing of it is asked for.
     others: Option<differentials::Prepared<'a>>,
 }
 
 impl<'a> Prepared<'a> {
     fn new(task: &'a Task<'a>) -> Result<Self> {
+        let scene = task.view.scene;
+        let lighting = Lighting::new(task.view)?;
+        let (mut expressions, mut parts, mut clean_layers) = (Vec::new(), Vec::new(), Vec::new());
+        for (layer, (aov, argument)) in task.aovs.iter().zip(task.arguments).enumerate() {
+            match aov.name {
+                COLOR_CLEAN => clean_layers.push(layer),
+                COLOR | VARIANCE | SAMPLE_COUNT => {}
+                _ if aov.family == Family::Transport => {
+                    let expression = Expression::of_aov(aov.name, argument)
+                        .map_err(|problem| Error::usage(format!("--aov {}:{argument}", aov.name), problem))?;
+                    expressions.push(expression.with_groups(lighting.groups()));
+                    parts.push(layer);
+                }
+                _ => {}
+            }
+        }
+        let plate = task.plate.map(|path| Plate::open(path, task.resolution)).transpose()?;
         let has_others = task.aovs.iter().any(|aov| aov.family != Family::Transport);
         Ok(Self {
             task,
             follower: Follower::of_camera(task.view, task.camera),
-            lighting: Lighting::new(task.view)?,
-            laws: Laws::new(task.view.scene, task.optics.dispersion_scale)?,
+            lighting,
+            laws: Laws::new(scene, task.optics.dispersion_scale)?,
+            clean: if clean_layers.is_empty() { None } else { Some(Laws::new(scene, 0.0)?) },
+            plate,
+            expressions,
+            parts,
+            clean_layers,
             others: if has_others { Some(Differentials::prepared(task)?) } else { None },
         })
+    }
+
+    fn setting(&self) -> Setting<'_> {
+        Setting {
+            view: self.task.view,
+            camera: self.task.camera,
+            follower: &self.follower,
+            lighting: &self.lighting,
+            plate: self.plate.as_ref(),
+            limits: self.task.depth_limits,
+        }
     }
 }
 
@@ -89,6 +137,8 @@ impl PreparedIntegrator for Prepared<'_> {
 struct PathWorker<'a, const N: usize, const DISPERSIVE: bool> {
     prepared: &'a Prepared<'a>,
     tracer: Tracer<'a, N, DISPERSIVE>,
+    /// Of the clean beauty, in which nothing disperses.
+    clean: Option<Tracer<'a, N, false>>,
     others: Option<Box<dyn differentials::SampleWorker + 'a>>,
     color_from_xyz: DMat3,
 }
@@ -97,7 +147,8 @@ impl<'a, const N: usize, const DISPERSIVE: bool> PathWorker<'a, N, DISPERSIVE> {
     fn new(prepared: &'a Prepared<'a>) -> Self {
         Self {
             prepared,
-            tracer: Tracer::new(prepared.task.view, &prepared.follower, &prepared.lighting, &prepared.laws),
+            tracer: Tracer::new(prepared.setting(), &prepared.laws, &prepared.expressions),
+            clean: prepared.clean.as_ref().map(|laws| Tracer::new(prepared.setting(), laws, &[])),
             others: prepared.others.as_ref().map(|others| others.sample_worker()),
             color_from_xyz: prepared.task.color_space.from_xyz(),
         }
@@ -112,16 +163,34 @@ impl<const N: usize, const DISPERSIVE: bool> Worker for PathWorker<'_, N, DISPER
             if let Some(others) = &mut self.others {
                 others.sample(&place, out);
             }
-            let mut numbers = task.sampler.path(pixel, index);
+            let numbers = task.sampler.path(pixel, index);
             let wavelengths = visible::sample::<N>(numbers.wavelength());
-            let seen = self.tracer.trace(&task.camera.ray(&place), wavelengths, &mut numbers);
-            let DVec3 { x, y, z } = self.color_from_xyz * sensor::xyz(seen.radiance, &wavelengths);
-            out.add_color([x, y, z, f64::from(seen.alpha)]);
+            let start = task.camera.ray(&place);
+            let color = |radiance| -> [f64; 3] {
+                let DVec3 { x, y, z } = self.color_from_xyz * sensor::xyz(radiance, &wavelengths);
+                [x, y, z]
+            };
+            let alpha = self.tracer.trace(&start, wavelengths, &mut numbers.clone()).into();
+            let [r, g, b] = color(self.tracer.ledger.total);
+            out.add_color([r, g, b, alpha]);
+            for (&layer, light) in self.prepared.parts.iter().zip(self.tracer.ledger.parts()) {
+                out.add(layer, Some(color(light)));
+            }
+            if let Some(clean) = &mut self.clean {
+                let alpha = clean.trace(&start, wavelengths, &mut numbers.clone()).into();
+                let [r, g, b] = color(clean.ledger.total);
+                for &layer in &self.prepared.clean_layers {
+                    out.add(layer, Some([r, g, b, alpha]));
+                }
+            }
         }
     }
 
     fn counters(&self) -> Counters {
         let mut counters = self.tracer.counters;
+        if let Some(clean) = &self.clean {
+            counters.add(&clean.counters);
+        }
         if let Some(others) = &self.others {
             counters.add(&others.counters());
         }

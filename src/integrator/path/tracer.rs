@@ -8,21 +8,26 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::bsdf::{Bsdf, Interface, Scattered};
+use super::depth::{Depth, DepthLimits};
+use super::ledger::Ledger;
+use super::plate::Plate;
+use crate::bsdf::{self, Bsdf, Interface, Scattered};
+use crate::camera::Camera;
 use crate::geometry::Ray;
 use crate::integrator::chain::{Counters, Follower};
 use crate::integrator::frame::Frame;
 use crate::integrator::lanes::{Laws, PathMedia};
+use crate::integrator::light_path::{self, Event, Expression};
 use crate::integrator::surface;
 use crate::integrator::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
-use crate::light::Light;
-use crate::lighting::{LightHit, LightSample, Lighting, Receiver};
+use crate::light::{Light, Shape};
+use crate::lighting::{LightHit, LightId, LightSample, Lighting, Receiver};
 use crate::optics::media::MediumId;
 use crate::ray::{RayStart, ScatterKind, mirror, refract_or_reflect};
 use crate::sampler::PathSampler;
 use crate::scene::view::View;
 use crate::spectrum::reflectance::Reflectance;
-use crate::spectrum::{SampledSpectrum, Wavelengths};
+use crate::spectrum::{SampledSpectrum, Wavelengths, visible};
 
 /// From this vertex on roulette may end a path.
 const ROULETTE_FROM: u32 = 4;
@@ -30,21 +35,23 @@ const ROULETTE_FROM: u32 = 4;
 /// A path survives a roulette with at most this probability: all paths end.
 const MOST_LIKELY: f32 = 0.97;
 
-/// What a path brings back.
+/// What all paths of a render have in common.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen<const N: usize> {
-    /// Spectral radiance per nm.
-    pub(super) radiance: SampledSpectrum<N>,
-    /// 1 where the camera sees a surface, 0 where it sees none.
-    pub(super) alpha: f32,
+pub(super) struct Setting<'a> {
+    pub(super) view: &'a View<'a>,
+    pub(super) camera: &'a Camera,
+    pub(super) follower: &'a Follower<'a>,
+    pub(super) lighting: &'a Lighting<'a>,
+    pub(super) plate: Option<&'a Plate>,
+    pub(super) limits: DepthLimits,
 }
 
 /// Traces paths on one thread.
 pub(super) struct Tracer<'a, const N: usize, const DISPERSIVE: bool> {
-    view: &'a View<'a>,
-    follower: &'a Follower<'a>,
-    lighting: &'a Lighting<'a>,
+    setting: Setting<'a>,
     media: PathMedia<'a, N>,
+    /// Radiance per nm of the last path, and what it is divided into.
+    pub(super) ledger: Ledger<'a, N>,
     pub(super) counters: Counters,
 }
 
@@ -53,9 +60,8 @@ struct Vertex<const N: usize> {
     receiver: Receiver,
     /// r before its event, over the density of the direction.
     r_over_pdf: SampledSpectrum<N>,
-    bsdf: Bsdf<N>,
-    wo: Vec3,
-    wi: Vec3,
+    /// The part of its weight that is diffuse.
+    diffuse_share: SampledSpectrum<N>,
 }
 
 /// What a path has come to.
@@ -64,39 +70,39 @@ struct State<const N: usize> {
     throughput: SampledSpectrum<N>,
     r: SampledSpectrum<N>,
     vertex: Option<Vertex<N>>,
-    /// The object of the last event, whose light links count.
+    /// The object of the last event: only lights that are linked to it count.
     object: Option<u32>,
-    radiance: SampledSpectrum<N>,
+    depth: Depth,
+    /// Since the camera light was only let through.
+    sees_through: bool,
+    alpha: f32,
 }
 
 impl<const N: usize> State<N> {
-    /// Adds the light that the path's ray has met.
-    fn meet<const DISPERSIVE: bool>(&mut self, lighting: &Lighting<'_>, direction: DVec3, met: &LightHit<N>) {
-        if self.object.is_some_and(|object| !lighting.is_linked(met.light, object)) {
-            return;
-        }
-        let Some(vertex) = &self.vertex else {
-            // Nothing but this way leads there.
-            let by_lanes = if DISPERSIVE { 1.0 / self.r.mean() } else { 1.0 };
-            self.radiance += self.throughput * met.radiance * by_lanes;
-            return;
-        };
-        let pdf = lighting.pdf(&vertex.receiver, direction, met);
-        let mut seen = met.radiance;
-        if let Some(light) = lighting.light(met.light)
-            && has_factors(light)
-        {
-            let f = vertex.bsdf.evaluate(vertex.wo, vertex.wi);
-            let (diffuse, specular) = (light.diffuse as f32, light.specular as f32);
-            seen *= (f.diffuse * diffuse + f.glossy * specular).safe_div(f.diffuse + f.glossy);
-        }
-        let weight = if DISPERSIVE {
-            1.0 / (self.r + vertex.r_over_pdf * pdf).mean()
-        } else {
-            1.0 / (1.0 + vertex.r_over_pdf.hero() * pdf)
-        };
-        self.radiance += self.throughput * seen * weight;
+    /// β / mean(r): what radiance from here counts.
+    fn carried<const DISPERSIVE: bool>(&self) -> SampledSpectrum<N> {
+        if DISPERSIVE { self.throughput * (1.0 / self.r.mean()) } else { self.throughput }
     }
+
+    /// The path's light ends in what is no part of the picture: as much of the pixel stays open.
+    fn open<const DISPERSIVE: bool>(&mut self) {
+        if self.alpha > 0.0 {
+            self.alpha -= self.carried::<DISPERSIVE>().mean().clamp(0.0, 1.0);
+        }
+    }
+}
+
+/// A surface that scatters, where the path has met it.
+struct Scatterer<'s, const N: usize> {
+    met: &'s SurfacePoint,
+    /// Geometric normal on the side of the path.
+    n_g: DVec3,
+    frame: Frame,
+    wo: Vec3,
+    bsdf: Bsdf<N>,
+    receiver: Receiver,
+    /// The medium behind, where the surface bounds one.
+    far: Option<Option<MediumId>>,
 }
 
 /// Where what could block a light at `distance` ends: before its own surface, which is met with the error of many roundings.
@@ -112,53 +118,44 @@ fn has_factors(light: &Light) -> bool {
 }
 
 impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
-    pub(super) fn new(
-        view: &'a View<'a>,
-        follower: &'a Follower<'a>,
-        lighting: &'a Lighting<'a>,
-        laws: &'a Laws<'a>,
-    ) -> Self {
-        let media = PathMedia::new(laws, crate::spectrum::visible::sample(0.5));
-        Self { view, follower, lighting, media, counters: Counters::default() }
+    pub(super) fn new(setting: Setting<'a>, laws: &'a Laws<'a>, expressions: &'a [Expression]) -> Self {
+        let media = PathMedia::new(laws, visible::sample(0.5));
+        Self { setting, media, ledger: Ledger::new(expressions), counters: Counters::default() }
     }
 
-    /// The radiance that arrives along `start` at the wavelengths, by one path.
-    pub(super) fn trace(
-        &mut self,
-        start: &RayStart,
-        wavelengths: Wavelengths<N>,
-        numbers: &mut PathSampler,
-    ) -> Seen<N> {
+    /// Follows one path from `start` at the wavelengths: its light stands in [`ledger`](Self::ledger) then. Returns alpha: 1 where
+    /// the camera sees a surface, 0 where it sees none.
+    pub(super) fn trace(&mut self, start: &RayStart, wavelengths: Wavelengths<N>, numbers: &mut PathSampler) -> f32 {
         self.media.restart(wavelengths);
-        let mut walk = Walk::new(self.follower, start);
+        self.ledger.restart();
+        let Setting { lighting, .. } = self.setting;
+        let mut walk = Walk::new(self.setting.follower, start);
         let mut state = State {
             wavelengths,
             throughput: SampledSpectrum::ONE,
             r: SampledSpectrum::ONE,
             vertex: None,
             object: None,
-            radiance: SampledSpectrum::ZERO,
+            depth: Depth::default(),
+            sees_through: true,
+            alpha: 0.0,
         };
-        let mut alpha = 0.0;
-        let mut vertices = 0;
         loop {
             let met = walk.advance(&mut self.counters);
             let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
             let medium = self.media.of(walk.media.current());
             let ray = walk.ray;
-            self.lighting.along(&ray, limit, &wavelengths, &mut |mut light| {
+            lighting.along(&ray, limit, &wavelengths, &mut |mut light| {
                 if let Some(through) = medium.transmittance(light.distance) {
                     light.radiance *= through;
                 }
-                state.meet::<DISPERSIVE>(self.lighting, ray.direction, &light);
+                self.meet(&state, ray.direction, &light);
             });
             let Some(met) = met else {
                 // What absorbs lets nothing through from infinitely far.
                 let absorbs = |sigma: &SampledSpectrum<N>| sigma.0.iter().any(|&sigma| sigma > 0.0);
                 if !medium.absorption.as_ref().is_some_and(absorbs) {
-                    self.lighting.environment(&ray, &wavelengths, &mut |light| {
-                        state.meet::<DISPERSIVE>(self.lighting, ray.direction, &light);
-                    });
+                    self.leave(&mut state, &ray);
                 }
                 break;
             };
@@ -170,11 +167,68 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 self.counters.exhausted += 1;
                 break;
             }
-            if !self.event(&mut walk, &met, &mut state, numbers, &mut alpha, &mut vertices) {
+            if !self.event(&mut walk, &met, &mut state, numbers) {
                 break;
             }
         }
-        Seen { radiance: state.radiance, alpha }
+        state.alpha
+    }
+
+    /// The path meets nothing more.
+    fn leave(&mut self, state: &mut State<N>, ray: &Ray) {
+        let Setting { lighting, camera, plate, .. } = self.setting;
+        if let (Some(plate), true) = (plate, state.sees_through) {
+            if state.alpha > 0.0 {
+                let seen = plate.radiance(camera, ray.direction, ray.time, &state.wavelengths);
+                let background = Event::emission(light_path::Source::Environment, None);
+                self.ledger.add(state.carried::<DISPERSIVE>() * seen, background);
+            }
+            return;
+        }
+        lighting.environment(ray, &state.wavelengths, &mut |light| self.meet(state, ray.direction, &light));
+    }
+
+    /// Adds the light that the path's ray has met.
+    fn meet(&mut self, state: &State<N>, direction: DVec3, met: &LightHit<N>) {
+        let lighting = self.setting.lighting;
+        if state.object.is_some_and(|object| !lighting.is_linked(met.light, object)) {
+            return;
+        }
+        let emission = self.emission(met.light);
+        let Some(vertex) = &state.vertex else {
+            // Nothing but this way leads there.
+            self.ledger.add(state.carried::<DISPERSIVE>() * met.radiance, emission);
+            return;
+        };
+        let pdf = lighting.pdf(&vertex.receiver, direction, met);
+        let mut seen = met.radiance;
+        if let Some(light) = lighting.light(met.light)
+            && has_factors(light)
+        {
+            let specular = SampledSpectrum::splat(light.specular as f32);
+            seen *= specular + vertex.diffuse_share * (light.diffuse - light.specular) as f32;
+        }
+        let weight = if DISPERSIVE {
+            1.0 / (state.r + vertex.r_over_pdf * pdf).mean()
+        } else {
+            1.0 / (1.0 + vertex.r_over_pdf.hero() * pdf)
+        };
+        self.ledger.add(state.throughput * seen * weight, emission);
+    }
+
+    /// What a light is to expressions.
+    fn emission(&self, id: LightId) -> Event {
+        if !self.ledger.is_divided() {
+            return Event::emission(light_path::Source::Light, None);
+        }
+        let Some(light) = self.setting.lighting.light(id) else {
+            return Event::emission(light_path::Source::Surface, None);
+        };
+        let source = match light.shape {
+            Shape::Distant(_) | Shape::Dome(_) => light_path::Source::Environment,
+            _ => light_path::Source::Light,
+        };
+        Event::emission(source, light.group)
     }
 
     /// What happens at a surface; whether the path goes on.
@@ -184,16 +238,15 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         met: &SurfacePoint,
         state: &mut State<N>,
         numbers: &mut PathSampler,
-        alpha: &mut f32,
-        vertices: &mut u32,
     ) -> bool {
-        let inside = self.view.inside(&met.hit, met.material_id);
+        let Setting { view, lighting, limits, .. } = self.setting;
+        let inside = view.inside(&met.hit, met.material_id);
         let medium = self.media.of(walk.media.current());
         // What lies behind: another medium only where the surface bounds one.
         let mut far = inside.map(|_| walk.far_side(met, &mut self.counters));
         let far_medium = far.as_ref().map_or(medium, |far| self.media.of(far.medium));
         let interface = Interface { ior_i: medium.iors, ior_t: far_medium.iors };
-        let at = surface::at(self.view, &walk.ray, met, &state.wavelengths, interface);
+        let at = surface::at(view, &walk.ray, met, &state.wavelengths, interface);
         let way = u64::from(met.hit.instance) << 32 | u64::from(met.hit.primitive);
         if at.presence < 1.0 && (at.presence <= 0.0 || numbers.of(way) >= at.presence) {
             walk.cross(met);
@@ -204,14 +257,18 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             walk.pass(met, far);
             return true;
         }
-        if *vertices == 0 {
-            *alpha = 1.0;
+        if state.sees_through && view.scene.objects.ids(met.hit.instance).appearance.matte {
+            state.open::<DISPERSIVE>();
+            return false;
+        }
+        if state.depth.total() == 0 {
+            state.alpha = 1.0;
         }
         let direction = walk.ray.direction;
-        if let Some(emitted) = self.lighting.emitted(&walk.ray, &met.hit, &state.wavelengths) {
-            state.meet::<DISPERSIVE>(self.lighting, direction, &emitted);
+        if let Some(emitted) = lighting.emitted(&walk.ray, &met.hit, &state.wavelengths) {
+            self.meet(state, direction, &emitted);
         }
-        if self.lighting.replaces_material(&met.hit) {
+        if lighting.replaces_material(&met.hit) {
             return false;
         }
         state.object = Some(met.hit.instance);
@@ -226,42 +283,38 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             Some(tangent) => Frame::along(normal, tangent),
             None => Frame::about(normal),
         };
-        let wo = frame.to_local(-direction);
-        let bsdf = Bsdf::new(&at.parameters);
-        let receiver = Receiver {
-            point: met.point,
-            normal: (!at.transmits).then(|| n_g.as_vec3()),
-            object: met.hit.instance,
-            time: walk.ray.time,
+        let surface = Scatterer {
+            met,
+            n_g,
+            frame,
+            wo: frame.to_local(-direction),
+            bsdf: Bsdf::new(&at.parameters),
+            receiver: Receiver {
+                point: met.point,
+                normal: (!at.transmits).then(|| n_g.as_vec3()),
+                object: met.hit.instance,
+                time: walk.ray.time,
+            },
+            far: far.as_ref().map(|far| far.medium),
         };
-        if !bsdf.is_smooth() && !self.lighting.is_empty() {
+        if !surface.bsdf.is_smooth() && !lighting.is_empty() {
             let [u_light, u, v, _] = numbers.next();
-            if let Some(light) = self.lighting.sample(&receiver, &state.wavelengths, u_light, [u, v]) {
-                let local = frame.to_local(light.wi);
-                // A side that the shading normal makes up is not lit.
-                if (local.z > 0.0) == (light.wi.dot(n_g) > 0.0) {
-                    self.add_direct(
-                        walk,
-                        met,
-                        &bsdf,
-                        [wo, local],
-                        &light,
-                        far.as_ref().map(|f| f.medium),
-                        state,
-                        numbers,
-                    );
-                }
+            if let Some(light) = lighting.sample(&surface.receiver, &state.wavelengths, u_light, [u, v]) {
+                self.add_direct(walk, &surface, &light, state, numbers);
             }
         }
-        *vertices += 1;
         let [u_lobe, u, v, u_roulette] = numbers.next();
-        let Some(sample) = bsdf.sample(wo, u_lobe, [u, v]) else { return false };
+        let Some(sample) = surface.bsdf.sample(surface.wo, u_lobe, [u, v]) else { return false };
+        state.depth = state.depth.after(sample.event);
+        if !state.depth.is_within(&limits) {
+            return false;
+        }
         let before = state.r;
         state.throughput *= sample.weight;
-        let (direction, passes) = match sample.scattered {
+        let (turned, passes) = match sample.scattered {
             Scattered::Toward(wi) => {
-                let direction = frame.to_world(wi);
-                let passes = direction.dot(n_g) < 0.0;
+                let turned = frame.to_world(wi);
+                let passes = turned.dot(n_g) < 0.0;
                 if passes != (wi.z < 0.0) {
                     return false;
                 }
@@ -269,8 +322,12 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 if DISPERSIVE {
                     state.r *= sample.pdf * (1.0 / hero);
                 }
-                state.vertex = Some(Vertex { receiver, r_over_pdf: before * (1.0 / hero), bsdf, wo, wi });
-                (direction, passes)
+                state.vertex = Some(Vertex {
+                    receiver: surface.receiver,
+                    r_over_pdf: before * (1.0 / hero),
+                    diffuse_share: sample.diffuse.safe_div(sample.weight),
+                });
+                (turned, passes)
             }
             Scattered::Mirror => {
                 state.vertex = None;
@@ -295,29 +352,32 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             }
             Scattered::Straight => {
                 state.vertex = None;
-                walk.cross(met);
-                return self.survives(state, *vertices, u_roulette);
+                (direction, true)
             }
         };
-        if passes {
-            match far {
-                Some(far) => walk.pass(met, far),
-                None => walk.cross(met),
-            }
+        if self.ledger.is_divided() {
+            self.ledger.scatter(&ways(&sample, passes));
         }
-        walk.turn(met, direction, passes);
-        self.survives(state, *vertices, u_roulette)
+        state.sees_through &= passes && sample.event != bsdf::Event::Diffuse;
+        match (sample.scattered, far) {
+            (Scattered::Straight, _) | (_, None) if passes => walk.cross(met),
+            (_, Some(far)) if passes => walk.pass(met, far),
+            _ => {}
+        }
+        if sample.scattered != Scattered::Straight {
+            walk.turn(met, turned, passes);
+        }
+        self.survives(state, u_roulette)
     }
 
     /// Roulette: a path goes on with the probability of what it still carries.
-    fn survives(&self, state: &mut State<N>, vertices: u32, u: f32) -> bool {
-        let carried = if DISPERSIVE { state.throughput * (1.0 / state.r.mean()) } else { state.throughput };
+    fn survives(&self, state: &mut State<N>, u: f32) -> bool {
         // As a mean over the lanes: that is what the pixel gets.
-        let carried = carried.mean();
+        let carried = state.carried::<DISPERSIVE>().mean();
         if !(carried > 0.0 && carried.is_finite()) {
             return false;
         }
-        if vertices < ROULETTE_FROM {
+        if state.depth.total() < ROULETTE_FROM {
             return true;
         }
         let probability = carried.min(MOST_LIKELY);
@@ -329,56 +389,73 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     }
 
     /// Adds what a sampled point of a light sends by way of the surface.
-    #[expect(clippy::too_many_arguments, reason = "a stretch of `event`, apart so that surfaces without it stay short")]
     fn add_direct(
         &mut self,
         walk: &Walk<'a>,
-        met: &SurfacePoint,
-        bsdf: &Bsdf<N>,
-        [wo, wi]: [Vec3; 2],
+        surface: &Scatterer<'_, N>,
         light: &LightSample<N>,
-        far: Option<Option<MediumId>>,
-        state: &mut State<N>,
+        state: &State<N>,
         numbers: &PathSampler,
     ) {
-        let f = bsdf.evaluate(wo, wi);
-        let source = self.lighting.light(light.light);
-        let value = match source {
-            Some(source) if has_factors(source) => {
-                f.diffuse * source.diffuse as f32 + f.glossy * source.specular as f32
-            }
-            _ => f.diffuse + f.glossy,
-        };
-        let mut carried = state.throughput * value * light.radiance;
-        if carried.is_black() {
+        let wi = surface.frame.to_local(light.wi);
+        let passes = light.wi.dot(surface.n_g) < 0.0;
+        // A side that the shading normal makes up is not lit.
+        if passes != (wi.z < 0.0) {
             return;
         }
-        let Some(through) = self.visibility(walk, met, light, source, far, state, numbers) else { return };
-        carried *= through;
+        let mut f = surface.bsdf.evaluate(surface.wo, wi);
+        let source = self.setting.lighting.light(light.light);
+        if let Some(source) = source
+            && has_factors(source)
+        {
+            f.diffuse *= source.diffuse as f32;
+            f.glossy *= source.specular as f32;
+        }
+        let gloss = if passes { bsdf::Event::GlossyTransmission } else { bsdf::Event::GlossyReflection };
+        let limits = &self.setting.limits;
+        if !state.depth.after(bsdf::Event::Diffuse).is_within(limits) {
+            f.diffuse = SampledSpectrum::ZERO;
+        }
+        if !state.depth.after(gloss).is_within(limits) {
+            f.glossy = SampledSpectrum::ZERO;
+        }
+        let carried = state.throughput * light.radiance;
+        if (carried * f.value()).is_black() {
+            return;
+        }
+        let Some(through) = self.visibility(walk, surface, light, source, state, numbers) else { return };
         let weight = match (light.is_delta, DISPERSIVE) {
             (true, true) => 1.0 / (state.r * light.pdf).mean(),
             (true, false) => 1.0 / light.pdf,
             (false, true) => 1.0 / (state.r * (f.pdf + SampledSpectrum::splat(light.pdf))).mean(),
             (false, false) => 1.0 / (f.pdf.hero() + light.pdf),
         };
-        state.radiance += carried * weight;
+        let carried = carried * through * weight;
+        if !self.ledger.is_divided() {
+            self.ledger.total += carried * f.value();
+            return;
+        }
+        let emission = self.emission(light.light);
+        let ways = [
+            (Event::scattering(bsdf::Event::Diffuse, passes), carried * f.diffuse),
+            (Event::scattering(gloss, passes), carried * f.glossy),
+        ];
+        self.ledger.add_scattered(&ways, emission);
     }
 
     /// What comes through from a sampled point of a light; `None` if nothing does.
-    #[expect(clippy::too_many_arguments, reason = "as `add_direct`")]
     fn visibility(
         &mut self,
         walk: &Walk<'a>,
-        met: &SurfacePoint,
+        surface: &Scatterer<'_, N>,
         light: &LightSample<N>,
         source: Option<&Light>,
-        far: Option<Option<MediumId>>,
         state: &State<N>,
         numbers: &PathSampler,
     ) -> Option<SampledSpectrum<N>> {
-        let passes = light.wi.dot(walk.ray.direction) > 0.0 && (light.wi.dot(met.surface.n_g) > 0.0) == met.hit.leaving;
-        let medium = match far {
-            Some(medium) if passes => medium,
+        let met = surface.met;
+        let medium = match surface.far {
+            Some(medium) if light.wi.dot(surface.n_g) < 0.0 => medium,
             _ => walk.media.current(),
         };
         let mut through = self.media.of(medium).transmittance(light.distance).unwrap_or(SampledSpectrum::ONE);
@@ -393,7 +470,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         self.counters.rays += 1;
         let natural = shadow.is_none_or(|shadow| shadow.is_natural());
         let mut nearest = f64::INFINITY;
-        let (view, wavelengths) = (self.view, &state.wavelengths);
+        let view = self.setting.view;
         let is_blocked = view.aggregate.is_blocked(&ray, &departures, before(light.distance), |hit| {
             if set.is_some_and(|set| !view.scene.is_linked(set, hit.instance)) {
                 return false;
@@ -419,9 +496,20 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             // What is seen in full shadow is the light times the shadow's colour.
             let strength = shadow.strength(nearest) as f32;
             let color = Reflectance::of_color(shadow.color.map(|c| c as f32));
-            let dark = color.at(wavelengths);
+            let dark = color.at(&state.wavelengths);
             through *= SampledSpectrum::splat(1.0 - strength) + dark * strength;
         }
         Some(through)
     }
+}
+
+/// The ways in which the drawn direction is scattered, with their shares.
+fn ways<const N: usize>(sample: &bsdf::BsdfSample<N>, passes: bool) -> [(Event, SampledSpectrum<N>); 2] {
+    let diffuse = Event::scattering(bsdf::Event::Diffuse, passes);
+    if !matches!(sample.scattered, Scattered::Toward(_)) {
+        return [(Event::scattering(sample.event, passes), SampledSpectrum::ONE), (diffuse, SampledSpectrum::ZERO)];
+    }
+    let gloss = if passes { bsdf::Event::GlossyTransmission } else { bsdf::Event::GlossyReflection };
+    let share = sample.diffuse.safe_div(sample.weight);
+    [(diffuse, share), (Event::scattering(gloss, passes), SampledSpectrum::ONE - share)]
 }
