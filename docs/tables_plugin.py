@@ -31,6 +31,7 @@ def tables() -> dict[str, str]:
     }
     for name in (
         "AbbeDispersionAPI",
+        "AbbeReflectanceAPI",
         "AbbeSubdivisionAPI",
         "AbbeLightAPI",
         "AbbeRenderSettingsAPI",

@@ -8,7 +8,7 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
 use abbe::film::aov::{self, Aov};
-use abbe::film::metadata::Attribute;
+use abbe::film::metadata::{Attribute, Metadata};
 use abbe::film::pixel::PixelAccumulator;
 use abbe::film::{Film, SampleRange, Values};
 use abbe::integrator::chain::Counters;
@@ -129,8 +129,9 @@ fn counts(film: &Film) -> &[u32] {
 /// Films of all passes, and the last.
 fn grown(scene: &Scene, request: &Request) -> (Vec<Film>, Rendered) {
     let films = Mutex::new(Vec::new());
-    let pass = |film: &Film| {
-        films.lock().unwrap().push(film.clone());
+    let pass = |film: Film, metadata: Metadata| {
+        assert_eq!(metadata.get("abbe:samples"), Some(&Attribute::Int(film.samples.total as i32)));
+        films.lock().unwrap().push(film);
         true
     };
     let rendered = run_with(scene, request, &Control { pass: Some(&pass), ..Control::none() });
@@ -174,7 +175,7 @@ fn a_part_of_the_samples_grows_too() {
 #[test]
 fn a_growing_render_stops_when_told() {
     let scene = ball().build();
-    let pass = |film: &Film| film.samples.end < 4;
+    let pass = |film: Film, _: Metadata| film.samples.end < 4;
     let stopped = run_with(&scene, &request(64), &Control { pass: Some(&pass), ..Control::none() });
     assert!(!stopped.statistics.complete);
     assert_eq!(stopped.statistics.passes, 3);
@@ -315,4 +316,59 @@ fn filters_are_of_light_alone() {
     // Light takes many samples unless told otherwise.
     assert_eq!(planned(&Request { samples: None, ..request(4) }).samples, SampleRange::all(64));
     assert_eq!(planned(&Request { samples: None, ..geometry }).samples, SampleRange::all(1));
+}
+
+#[test]
+fn spectral_bins_have_a_layout_of_their_own_and_one_beside_others() {
+    let scene = ball().build();
+    let planned = |aovs: &[&str]| {
+        let request =
+            Request { aovs: Some(aovs.iter().map(|name| (*name).to_owned()).collect()), ..Request::default() };
+        plan(&scene, &Request { integrator: Some("path".into()), ..request }, &Registry::default())
+            .map(|mut plans| plans.remove(0))
+    };
+    let alone = planned(&["spectral:400:700:100"]).unwrap();
+    assert_eq!(alone.layers[0].name, "S0");
+    assert_eq!(alone.layers[0].aov.channels, ["450,000000nm", "550,000000nm", "650,000000nm"]);
+    let beside = planned(&["color", "spectral"]).unwrap();
+    assert_eq!(beside.layers[1].name, "spectral");
+    assert_eq!(beside.layers[1].aov.channels.len(), 30);
+    assert_eq!(beside.layers[1].aov.channels[15], "w555");
+    let named = planned(&["color", "fine=spectral:500:600:5"]).unwrap();
+    assert_eq!((named.layers[1].name.as_str(), named.layers[1].argument.as_str()), ("fine", "500:600:5"));
+    for (wrong, hint) in [("spectral:1:2:3", "360"), ("color:x", "no argument"), ("spectral:400:700", "LO:HI:WIDTH")] {
+        assert!(planned(&[wrong]).unwrap_err().to_string().contains(hint), "{wrong}");
+    }
+}
+
+#[test]
+fn spectral_layers_return_from_files_and_merge() {
+    let scene = ball().build();
+    let folder = tempfile::tempdir().unwrap();
+    let asked = |range: Option<[u32; 2]>| Request {
+        width: Some(9),
+        height: Some(7),
+        samples: Some(8),
+        integrator: Some("path".into()),
+        aovs: Some(vec!["color".into(), "spectral:400:700:50".into(), "variance".into()]),
+        sample_range: range,
+        ..Request::default()
+    };
+    let write = |name: &str, request: &Request| {
+        let plan = plan(&scene, request, &Registry::default()).unwrap_or_else(|e| panic!("{e}")).remove(0);
+        let image = render(&scene, &plan, &Registry::default(), &Control::none()).unwrap_or_else(|e| panic!("{e}"));
+        let path = folder.path().join(name);
+        abbe::exr::write(&path, &image.film, &image.metadata).unwrap();
+        (path, image)
+    };
+    let (whole, image) = write("whole.exr", &asked(None));
+    let (film, metadata) = abbe::exr::read(&whole).unwrap();
+    assert_eq!(film.layers[1].aov.channels, ["w425", "w475", "w525", "w575", "w625", "w675"]);
+    assert_eq!(film.layers[1].argument, "400:700:50");
+    assert_eq!(film.layers[2], image.film.layers[2]);
+    assert!(metadata.get("abbe:argument:spectral").is_some());
+    let parts: Vec<_> = [[0, 4], [4, 8]].iter().map(|&r| write(&format!("{}.exr", r[0]), &asked(Some(r))).0).collect();
+    let merged = folder.path().join("merged.exr");
+    abbe::exr::merge(&parts, &merged).unwrap();
+    assert!(std::fs::read(&whole).unwrap() == std::fs::read(&merged).unwrap());
 }

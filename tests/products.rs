@@ -112,7 +112,9 @@ fn what_a_variable_asks_for_in_vain_is_named() {
     let of_type = |source_type: &str, source: &str| {
         let mut asked = var("Var", source, &[]);
         asked.source_type = source_type.into();
-        let plan = planned(product(vec![var("Depth", "depth", &[]), asked]));
+        let mut product = product(vec![var("Depth", "depth", &[]), asked]);
+        product.abbe = map(&[("abbe:integrator", json!("differentials"))]);
+        let plan = planned(product);
         let message = plan.diagnostics.warnings().first().map(|w| w.message.clone());
         (plan.layers.get(1).map(|layer| layer.aov.name), message.unwrap_or_default())
     };

@@ -13,7 +13,8 @@ package makes its USD schemas known to a USD that is there.
 from __future__ import annotations
 
 from . import schemas as _schemas
-from ._api import Plan, Progress, Scene, integrators, merge, render
+from . import spectrum
+from ._api import Plan, Progress, Scene, integrators, merge, progressive, render
 from ._core import Film, __version__
 from .catalog import Glass, glass, glasses, nearest_glass
 from .errors import AbbeError, StageError, UsageError, UsdMissingError
@@ -41,9 +42,11 @@ __all__ = [
     "integrators",
     "merge",
     "nearest_glass",
+    "progressive",
     "reflect",
     "refract",
     "render",
+    "spectrum",
     "transfer",
 ]
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import logging
 import os
+import queue
+import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypedDict, Unpack
@@ -23,6 +25,7 @@ __all__ = [
     "counted",
     "integrators",
     "merge",
+    "progressive",
     "render",
     "warning_text",
 ]
@@ -63,6 +66,11 @@ class Options(TypedDict, total=False):
     width: int | None
     height: int | None
     samples: int | None
+    error_target: float | None
+    time_limit: float | None
+    clamp: float | None
+    pixel_filter: str | None
+    pixel_filter_width: float | None
     depth_of_field: bool | None
     integrator: str | None
     aovs: Sequence[str] | None
@@ -442,14 +450,89 @@ class Scene:
         KeyboardInterrupt
             Ctrl-C; the finished part is the exception's attribute ``film``, and its statistics say ``complete: False``.
         """
+        self._need_one_plan(options)
+        return self.render_plan(0, progress=progress, **options)
+
+    def _need_one_plan(self, options: Options) -> None:
         plans = self.plans(**options)
         if len(plans) > 1:
             names = ", ".join(plan.product for plan in plans)
             raise UsageError(f"product: the stage has {len(plans)}: choose one of {names}")
-        return self.render_plan(0, progress=progress, **options)
+
+    def progressive(self, **options: Unpack[Options]) -> Iterator[_core.Film]:
+        """Render one image in growing numbers of samples: 1, 2, 4, 8 … of each pixel.
+
+        Each film is, to the bit, what the first so many samples of the render give; the last is what :meth:`render`
+        returns. Rendering goes on in a thread of its own only while the next film is waited for.
+
+        Parameters
+        ----------
+        options : as for :func:`render`; ``samples`` is where it ends
+
+        Yields
+        ------
+        Film
+            ``film.samples`` tells how many samples it has.
+
+        Raises
+        ------
+        UsageError
+            As :meth:`render`, at once.
+        KeyboardInterrupt
+            Ctrl-C; the films so far are complete in themselves.
+        """
+        self._need_one_plan(options)
+        return self._films(options)
+
+    def _films(self, options: Options) -> Iterator[_core.Film]:
+        # Films come from the rendering thread; it goes on when told to.
+        films: queue.SimpleQueue[_core.Film | BaseException | None] = queue.SimpleQueue()
+        go_on: queue.SimpleQueue[bool] = queue.SimpleQueue()
+        stopped = threading.Event()
+
+        def passed(film: _core.Film) -> None:
+            films.put(film)
+            if not go_on.get():
+                raise _Stopped
+
+        def watch(done: int, total: int) -> None:
+            if stopped.is_set():
+                raise _Stopped
+
+        def work() -> None:
+            try:
+                self._tell(self._core.render(_request(options), 0, watch, passed))
+                films.put(None)
+            except _Stopped:
+                films.put(None)
+            except BaseException as error:
+                films.put(error)
+
+        thread = threading.Thread(target=work, name="abbe.progressive", daemon=True)
+        thread.start()
+        try:
+            while (film := films.get()) is not None:
+                if isinstance(film, BaseException):
+                    raise film
+                yield film
+                go_on.put(True)
+        finally:
+            stopped.set()
+            go_on.put(False)
+            thread.join()
+
+    def _tell(self, film: _core.Film) -> _core.Film:
+        for line in warning_lines([w for w in film.statistics["warnings"] if w not in self._told]):
+            _log.warning("%s", line)
+        return film
 
     def render_plan(
-        self, index: int, *, progress: Callable[[Progress], object] | None = None, **options: Unpack[Options]
+        self,
+        index: int,
+        *,
+        progress: Callable[[Progress], object] | None = None,
+        passed: Callable[[_core.Film], object] | None = None,
+        **options: Unpack[Options],
     ) -> _core.Film:
         """Render the image of ``plans(**options)[index]``; else as :meth:`render`.
 
@@ -457,6 +540,7 @@ class Scene:
         ----------
         index : which of the plans
         progress, options : as for :meth:`render`
+        passed : called with the film of 1, 2, 4, 8 … samples and of all, while the render waits; changes no bit
 
         Returns
         -------
@@ -474,10 +558,11 @@ class Scene:
             if progress is not None:
                 progress(Progress(done, total, time.monotonic() - begin))
 
-        film = self._core.render(_request(options), index, report if progress is not None else None)
-        for line in warning_lines([w for w in film.statistics["warnings"] if w not in self._told]):
-            _log.warning("%s", line)
-        return film
+        return self._tell(self._core.render(_request(options), index, report if progress is not None else None, passed))
+
+
+class _Stopped(Exception):
+    """Nobody waits for more films."""
 
 
 def render(
@@ -491,6 +576,11 @@ def render(
     width: int | None = None,
     height: int | None = None,
     samples: int | None = None,
+    error_target: float | None = None,
+    time_limit: float | None = None,
+    clamp: float | None = None,
+    pixel_filter: str | None = None,
+    pixel_filter_width: float | None = None,
     depth_of_field: bool | None = None,
     integrator: str | None = None,
     aovs: Sequence[str] | None = None,
@@ -530,7 +620,12 @@ def render(
     render_pass : path of a RenderPass prim: its settings, and what it shows, hides and prunes
     product : path of a RenderProduct; needed where the stage has several
     width, height : pixels, >= 1; one alone keeps the aspect
-    samples : samples per pixel, >= 1
+    samples : samples per pixel, >= 1; with an error target the most of them
+    error_target : relative error of a pixel, as its own samples tell it, at which it gets no more of them
+    time_limit : seconds after which the image is finished with the samples that it has
+    clamp : the most that a sample of the beauty may have in R, G, B; counted in the statistics and the header
+    pixel_filter : how light is spread over pixels: box, triangle, gaussian, blackmanHarris
+    pixel_filter_width : its full width in pixels
     depth_of_field : spread samples over the camera's lens; as the stage says if None
     integrator : a name of :func:`integrators`
     aovs : names of AOVs or aliases of them (``abbe aovs`` lists them); the stage's RenderVars if None
@@ -592,6 +687,11 @@ def render(
         width=width,
         height=height,
         samples=samples,
+        error_target=error_target,
+        time_limit=time_limit,
+        clamp=clamp,
+        pixel_filter=pixel_filter,
+        pixel_filter_width=pixel_filter_width,
         depth_of_field=depth_of_field,
         integrator=integrator,
         aovs=aovs,
@@ -606,6 +706,39 @@ def render(
         sample_range=sample_range,
         strict=strict,
     )
+
+
+_OF_REQUESTS = frozenset(Options.__annotations__)
+# What the bridge settles when the stage is loaded.
+_OF_STAGES = frozenset({"camera", "product"})
+
+
+def progressive(stage: Any, **options: Any) -> Iterator[_core.Film]:
+    """Render a USD stage in growing numbers of samples; as :meth:`Scene.progressive`.
+
+    >>> for film in abbe.progressive("prism.usda", samples=1024, aovs=["color"]):
+    ...     show(film["color"])
+
+    Parameters
+    ----------
+    stage : path of a .usd, .usda, .usdc or .usdz file, or a ``pxr.Usd.Stage``, which is not changed
+    options : as for :func:`render`
+
+    Yields
+    ------
+    Film
+        With 1, 2, 4, 8 … samples, and at last all of them.
+
+    Raises
+    ------
+    StageError, UsageError, KeyboardInterrupt
+        As :func:`render`.
+    """
+    of_request = {name: options.pop(name) for name in list(options) if name in _OF_REQUESTS - _OF_STAGES}
+    if "strict" in of_request:
+        options["strict"] = of_request["strict"]
+    scene = Scene.from_stage(stage, motion_vectors=asks_for_motion(of_request.get("aovs")), **options)
+    return scene.progressive(**of_request)
 
 
 def merge(inputs: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str]) -> None:

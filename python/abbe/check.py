@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -65,7 +66,12 @@ _LEAST: Mapping[str, tuple[float, bool]] = {
     "dispersion_footprint": (0.0, True),
     "footprint_half_width": (0.0, True),
     "depth": (0.0, True),
+    "sample_count": (1.0, True),
+    "variance": (0.0, True),
 }
+
+# The channel of a spectral bin, beside other layers and in a file of its own.
+_BIN = re.compile(r"w\d+(p\d+)?|\d+,\d+nm")
 
 _UNIT_VECTORS = frozenset({"normal", "normal_geometric", "refracted_normal", "refracted_normal_geometric"})
 
@@ -431,6 +437,12 @@ class _Checker:
     def layer(self, name: str, row: AovRow) -> list[str]:
         """Check one layer; returns the channels it has a claim to."""
         suffixes = [str(suffix) for suffix in row["channels"]]
+        if row["name"] == "spectral":
+            # A channel per bin, as many as there are.
+            found = [
+                channel.removeprefix(f"{name}.") for channel in self.image.channels if channel.startswith(f"{name}.")
+            ]
+            suffixes = [suffix for suffix in found if _BIN.fullmatch(suffix)] or suffixes
         is_half = self.image.is_half(name) and row["sample"] != "uint"
         wanted = np.uint32 if row["sample"] == "uint" else np.float16 if is_half else np.float32
         names = [channel_name(name, suffix) for suffix in suffixes]
@@ -513,6 +525,12 @@ class _Checker:
                 self.fail_where(
                     off & (length < 1), "the vector of a single sample must have length 1", names[0], length
                 )
+        if aov == "color":
+            alpha = values[:, :, 3]
+            outside = np.isfinite(alpha) & ~((alpha >= 0) & (alpha <= 1 + tolerance))
+            self.fail_where(outside, "must be in 0..1", names[3], alpha)
+        if aov == "sample_count" and self.samples is not None:
+            self.fail_where(first > self.samples, f"must not exceed the {self.samples} samples", names[0], first)
         if aov in ("interfaces", "rough_interfaces", "total_reflections"):
             message = f"a chain has at most {_MOST_EVENTS} events"
             self.fail_where(first > _MOST_EVENTS, message, names[0], first)

@@ -352,8 +352,14 @@ def _picture(tile: Tile) -> _Picture:
         return _filter(values, some)
     if tile.aov.endswith("albedo"):
         return _Picture(srgb(np.clip(values, 0.0, 1.0)), _note("linear Rec. 709, shown as sRGB"))
+    if tile.aov == "variance":
+        return _magnitude(np.sqrt(np.mean(values, axis=-1)), some, "standard error of the mean")
+    if tile.unit == "radiance":
+        return _Picture(srgb(np.clip(values[:, :, :3], 0.0, 1.0)), _note("linear light, shown as sRGB"))
     if channels == 2:
         return _vectors(values, some, tile.unit)
+    if tile.aov == "spectral":
+        return _magnitude(np.mean(values, axis=-1), some, "mean over the bins")
     if channels > 1:
         return _magnitude(np.linalg.norm(values, axis=-1), some, "length of the vector")
     if tile.aov.endswith("depth"):

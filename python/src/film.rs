@@ -32,7 +32,7 @@ impl PyFilm {
     fn layer(&self, name: &str) -> PyResult<&Layer> {
         let by_layer_name = || self.film.layers.iter().find(|layer| layer.name == name);
         self.film.layer(aov::canonical_name(name)).or_else(by_layer_name).ok_or_else(|| {
-            let names: Vec<_> = self.film.layers.iter().map(|layer| layer.aov.name).collect();
+            let names: Vec<_> = self.film.layers.iter().map(Layer::key).collect();
             PyKeyError::new_err(format!("'{name}' was not rendered: this film has {}", names.join(", ")))
         })
     }
@@ -45,12 +45,12 @@ impl PyFilm {
 #[pymethods]
 impl PyFilm {
     /// The AOVs of this film, in the order they were asked for.
-    fn names(&self) -> Vec<&'static str> {
-        self.film.layers.iter().map(|layer| layer.aov.name).collect()
+    fn names(&self) -> Vec<&str> {
+        self.film.layers.iter().map(Layer::key).collect()
     }
 
     /// The same as :meth:`names`: ``dict(film)`` and ``for name in film`` work.
-    fn keys(&self) -> Vec<&'static str> {
+    fn keys(&self) -> Vec<&str> {
         self.names()
     }
 
@@ -105,6 +105,17 @@ impl PyFilm {
     fn window(&self) -> (i32, i32, i32, i32) {
         let window = self.film.window;
         (window.x0, window.y0, window.x1, window.y1)
+    }
+
+    /// Samples of each pixel that the film covers; with an error target the most that a pixel can have.
+    #[getter]
+    fn samples(&self) -> u32 {
+        self.film.samples.end - self.film.samples.begin
+    }
+
+    /// Names of the channels of the AOV ``name``, in the order of the array's last axis.
+    fn channels(&self, name: &str) -> PyResult<Vec<&'static str>> {
+        Ok(self.layer(name)?.aov.channels.to_vec())
     }
 
     /// What was counted, chosen and met during the render.

@@ -11,6 +11,7 @@ mod json;
 mod memory;
 mod optics;
 mod scene;
+mod spectrum;
 
 /// The compiled half of the package `abbe`.
 #[pymodule]
@@ -28,6 +29,8 @@ mod _core {
     use crate::optics::{PyDispersion, reflect, refract, transfer};
     #[pymodule_export]
     use crate::scene::PyScene;
+    #[pymodule_export]
+    use crate::spectrum::{blackbody_radiance, color_of_spectrum, illuminant_power, reflectance_of_color};
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {

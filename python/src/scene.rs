@@ -3,11 +3,14 @@
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
 use abbe::Error;
+use abbe::film::Film;
+use abbe::film::metadata::Metadata;
 use abbe::integrator::Registry;
 use abbe::render::{self, Control, Plan, Progress, Rendered, Request};
 use abbe::scene::description::Description;
@@ -156,13 +159,15 @@ impl PyScene {
     ///
     /// About ten times a second the calling thread looks for signals and calls ``progress(done, total)`` (pixels). If either
     /// raises, the render stops and the exception goes on to the caller with what was finished as its attribute ``film``.
-    #[pyo3(signature = (request, plan_index = 0, progress = None))]
+    /// With ``passed`` the render grows: it is called with the film of 1, 2, 4 … samples while the render waits.
+    #[pyo3(signature = (request, plan_index = 0, progress = None, passed = None))]
     fn render<'py>(
         &self,
         py: Python<'py>,
         request: &str,
         plan_index: usize,
         progress: Option<Py<PyAny>>,
+        passed: Option<Py<PyAny>>,
     ) -> Outcome<Bound<'py, PyFilm>> {
         let plan = released(py, || self.plan_at(request, plan_index))?;
         let total = plan.window.area() as u64;
@@ -175,7 +180,18 @@ impl PyScene {
                 None => Ok(()),
             }
         };
-        let (rendered, raised) = py.detach(|| watch(&self.scene, &plan, &self.registry, &cancel, &done, &ask));
+        let show = |py: Python<'_>, film: Film, metadata: Metadata| -> PyResult<()> {
+            let Some(callback) = &passed else { return Ok(()) };
+            let statistics = serde_json::json!({
+                "complete": true,
+                "pixels": film.window.area(),
+                "samples": film.samples.end - film.samples.begin,
+                "warnings": [],
+            });
+            callback.call1(py, (PyFilm::new(film, metadata, statistics),)).map(drop)
+        };
+        let show: Option<&Show<'_>> = if passed.is_some() { Some(&show) } else { None };
+        let (rendered, raised) = py.detach(|| watch(&self.scene, &plan, &self.registry, &cancel, &done, &ask, show));
         let rendered = rendered?;
         let statistics = serde_json::to_value(&rendered.statistics).expect("statistics have string keys");
         let film = Bound::new(py, PyFilm::new(rendered.film, rendered.metadata, statistics))?;
@@ -190,6 +206,16 @@ impl PyScene {
     }
 }
 
+/// Shows the film of a pass.
+type Show<'a> = dyn Fn(Python<'_>, Film, Metadata) -> PyResult<()> + Sync + 'a;
+
+/// What the rendering thread says.
+enum Message {
+    /// A pass has ended; the thread waits for an answer.
+    Passed(Box<(Film, Metadata)>),
+    Ended(Outcome<Rendered>),
+}
+
 /// Renders on a thread of its own while this one asks (with the interpreter) whether to go on.
 ///
 /// Returns what was rendered, and the exception that stopped it.
@@ -200,26 +226,48 @@ fn watch(
     cancel: &AtomicBool,
     done: &AtomicU64,
     ask: &(dyn Fn(Python<'_>) -> PyResult<()> + Sync),
+    show: Option<&Show<'_>>,
 ) -> (Outcome<Rendered>, Option<PyErr>) {
     let note = |progress: Progress| {
         done.fetch_max(progress.done, Ordering::Relaxed);
     };
     std::thread::scope(|threads| {
         let (send, receive) = sync_channel(1);
+        let (answer, answers) = sync_channel::<bool>(1);
+        let answers = Mutex::new(answers);
         threads.spawn(move || {
-            let control = Control { cancel, progress: &note, pass: None };
+            let pass = |film, metadata| {
+                let said = send.send(Message::Passed(Box::new((film, metadata))));
+                said.is_ok() && answers.lock().is_ok_and(|answers| answers.recv() == Ok(true))
+            };
+            let pass: &(dyn Fn(Film, Metadata) -> bool + Sync) = &pass;
+            let control = Control { cancel, progress: &note, pass: show.is_some().then_some(pass) };
             let work = AssertUnwindSafe(|| render::render(scene, plan, registry, &control));
             let outcome = match catch_unwind(work) {
                 Ok(outcome) => outcome.map_err(Failure::from),
                 Err(panic) => Err(defect(panic.as_ref())),
             };
             // The other end waits until this arrives.
-            let _ = send.send(outcome);
+            let _ = send.send(Message::Ended(outcome));
         });
         let mut raised = None;
         let outcome = loop {
             match receive.recv_timeout(POLL) {
-                Ok(outcome) => break outcome,
+                Ok(Message::Ended(outcome)) => break outcome,
+                Ok(Message::Passed(pass)) => {
+                    let (film, metadata) = *pass;
+                    let shown = Python::attach(|py| {
+                        ask(py)?;
+                        show.map_or(Ok(()), |show| show(py, film, metadata))
+                    });
+                    let goes_on = shown.is_ok();
+                    if let Err(error) = shown {
+                        cancel.store(true, Ordering::Relaxed);
+                        raised = Some(error);
+                    }
+                    // The thread waits for this; if it has ended, that arrives next.
+                    let _ = answer.send(goes_on);
+                }
                 Err(RecvTimeoutError::Disconnected) => break Err(Failure::Defect("the render thread ended".into())),
                 Err(RecvTimeoutError::Timeout) if raised.is_some() => {}
                 Err(RecvTimeoutError::Timeout) => {

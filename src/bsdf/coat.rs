@@ -32,11 +32,11 @@ impl<const N: usize> CoatLobe<N> {
         }
     }
 
-    /// What its colour leaves of light between the base and two directions.
+    /// What its colour leaves of light between the base and a direction, and back to another one if there is one.
     #[inline]
-    pub(super) fn absorption(&self, mu_o: f32, mu_i: f32) -> SampledSpectrum<N> {
+    pub(super) fn absorption(&self, mu_o: f32, mu_i: Option<f32>) -> SampledSpectrum<N> {
         let Some(half_log) = self.half_log else { return SampledSpectrum::ONE };
-        let path = self.path(mu_o) + self.path(mu_i);
+        let path = self.path(mu_o) + mu_i.map_or(0.0, |mu| self.path(mu));
         half_log.map(|log| 1.0 + self.weight * (libm::expf(log * path) - 1.0))
     }
 

@@ -52,7 +52,8 @@ impl<const N: usize> Conductor<N> {
                     (std::array::from_fn(|i| (t[i] * (1.0 - back[i])).max(0.0)), albedo::mean(t))
                 }
             };
-            let missing_mean = albedo::mean(&missing).max(0.0);
+            let missing_mean =
+                albedo::mean_of_spectra(&ggx.over_azimuths(&missing.map(SampledSpectrum::<1>::splat)))[0];
             let got = if all > 0.0 { (1.0 - missing_mean / all).clamp(0.0, 1.0) } else { 1.0 };
             let scale = if missing_mean > 0.0 { FRAC_1_PI / missing_mean } else { 0.0 };
             Rough { ggx, missing, multiple: diffuse::multiple(mean, got) * scale }
@@ -78,7 +79,8 @@ impl<const N: usize> Conductor<N> {
     pub(super) fn evaluate(&self, rough: &Rough<N>, pair: &Pair, through: f32) -> SampledSpectrum<N> {
         let Pair { wo, wi, h, at_o, at_i } = pair;
         let single = rough.ggx.d(*h) * rough.ggx.visibility(*wo, *wi) * through * wi.z;
-        let twice = at_o.of(&rough.missing).max(0.0) * at_i.of(&rough.missing).max(0.0) * wi.z;
+        let missing = |w: Vec3, at: &At| rough.ggx.at(w, at).of(&rough.missing);
+        let twice = missing(*wo, at_o) * missing(*wi, at_i) * wi.z;
         (self.fresnel.at(wo.dot(*h)) * single + rough.multiple * twice) * self.weight
     }
 }
@@ -86,14 +88,14 @@ impl<const N: usize> Conductor<N> {
 impl<const N: usize> Rough<N> {
     /// Probability with which the lobe of multiple scattering is drawn.
     #[inline]
-    fn choice(&self, at_o: &At, above: f32) -> f32 {
-        if above > 0.0 { (at_o.of(&self.missing) / above).clamp(0.0, 1.0) } else { 1.0 }
+    fn choice(&self, wo: Vec3, at_o: &At, above: f32) -> f32 {
+        if above > 0.0 { (self.ggx.at(wo, at_o).of(&self.missing) / above).clamp(0.0, 1.0) } else { 1.0 }
     }
 
     /// Draws a direction.
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, at_o: &At, above: f32, u_lobe: f32, u: [f32; 2]) -> Vec3 {
-        if u_lobe < self.choice(at_o, above) {
+        if u_lobe < self.choice(wo, at_o, above) {
             diffuse::sample_cosine(u)
         } else {
             super::microfacet::mirror(wo, self.ggx.sample_reflecting(wo, u))
@@ -103,7 +105,7 @@ impl<const N: usize> Rough<N> {
     /// Density per solid angle of [`Self::sample`].
     #[inline]
     pub(super) fn pdf(&self, pair: &Pair, above: f32) -> f32 {
-        let choice = self.choice(&pair.at_o, above);
+        let choice = self.choice(pair.wo, &pair.at_o, above);
         choice * pair.wi.z * FRAC_1_PI + (1.0 - choice) * self.ggx.reflecting_pdf(pair.wo, pair.h)
     }
 }

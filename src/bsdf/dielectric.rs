@@ -119,24 +119,31 @@ impl<const N: usize> Dielectric<N> {
     }
 
     /// The branch that a smooth interface takes; `None` where the hero cannot take it. `chosen` is the probability of having come here,
-    /// `through` what the layers above leave.
-    pub(super) fn sample(&self, cos_i: f32, u: f32, chosen: f32, through: SampledSpectrum<N>) -> Option<BsdfSample<N>> {
+    /// `through` what the layers above leave of the reflected and of the transmitted light.
+    pub(super) fn sample(
+        &self,
+        cos_i: f32,
+        u: f32,
+        chosen: f32,
+        through: [SampledSpectrum<N>; 2],
+    ) -> Option<BsdfSample<N>> {
         let split = self.split(cos_i);
         let p = split.probability();
         let (scattered, event, value, probability) = if u < p {
-            (Scattered::Mirror, Event::SpecularReflection, split.reflected, p)
+            (Scattered::Mirror, Event::SpecularReflection, split.reflected * through[0], p)
         } else if split.transmitted.hero() <= 0.0 {
             return None;
         } else if self.thin {
-            (Scattered::Straight, Event::Straight, split.transmitted, 1.0 - p)
+            (Scattered::Straight, Event::Straight, split.transmitted * through[1], 1.0 - p)
         } else {
-            (Scattered::Refract, Event::SpecularTransmission, split.transmitted * self.radiance(), 1.0 - p)
+            let value = split.transmitted * self.radiance() * through[1];
+            (Scattered::Refract, Event::SpecularTransmission, value, 1.0 - p)
         };
         let probability = chosen * probability;
         Some(BsdfSample {
             scattered,
             event,
-            weight: value * through * (self.weight / probability),
+            weight: value * (self.weight / probability),
             diffuse: SampledSpectrum::ZERO,
             pdf: SampledSpectrum::splat(probability),
         })
@@ -147,7 +154,7 @@ impl<const N: usize> RoughDielectric<N> {
     /// `None` where the surface is smooth.
     pub(super) fn new(facet: &Dielectric<N>, alpha: [f32; 2]) -> Option<Self> {
         let ggx = gloss::distribution(alpha).filter(|_| !facet.is_matched())?;
-        Some(Self { facet: *facet, ggx, multiple: Multiple::new(facet, Roughness::new(ggx.mean_alpha())) })
+        Some(Self { facet: *facet, ggx, multiple: Multiple::new(facet, &ggx) })
     }
 
     /// Its share of the surface.
@@ -163,7 +170,7 @@ impl<const N: usize> RoughDielectric<N> {
 
     /// Draws a direction off the rough interface; `None` where a facet sends it back into the surface.
     pub(super) fn sample(&self, wo: Vec3, at_o: &At, u_lobe: f32, u: [f32; 2]) -> Option<Vec3> {
-        let choice = self.choice(at_o);
+        let choice = self.choice(&self.ggx.at(wo, at_o));
         if u_lobe < choice {
             let wi = diffuse::sample_cosine(u);
             return Some(if u_lobe < choice * self.multiple.share { wi } else { Vec3::new(wi.x, wi.y, -wi.z) });
@@ -193,8 +200,8 @@ impl<const N: usize> RoughDielectric<N> {
     /// f |cos θ_i| and density of the rough interface.
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3, at_o: &At) -> Valued<N> {
         let cos = wi.z.abs();
-        let at_i = At::cosine(cos);
-        let choice = self.choice(at_o);
+        let (at_o, at_i) = (self.ggx.at(wo, at_o), self.ggx.at(wi, &At::cosine(cos)));
+        let choice = self.choice(&at_o);
         let near = at_o.of_spectra(&self.multiple.near);
         let through = self.ggx.visibility(wo, wi) * cos;
         if wi.z > 0.0 {
@@ -240,12 +247,13 @@ impl<const N: usize> RoughDielectric<N> {
 }
 
 impl<const N: usize> Multiple<N> {
-    fn new(facet: &Dielectric<N>, roughness: Roughness) -> Self {
+    fn new(facet: &Dielectric<N>, ggx: &Ggx) -> Self {
+        let roughness = Roughness::new(ggx.mean_alpha());
+        let mean = |slices: &Slices<N>| albedo::mean_of_spectra(&ggx.over_azimuths(slices));
         let quotient = |x: f32, mean: f32| if mean > 0.0 { x * FRAC_1_PI / mean } else { 0.0 };
         if facet.thin {
-            let missing = roughness.white().map(|e| (1.0 - e).max(0.0));
-            let mean = albedo::mean(&missing);
-            let near = missing.map(SampledSpectrum::splat);
+            let near = roughness.white().map(|e| SampledSpectrum::splat((1.0 - e).max(0.0)));
+            let mean = mean(&near)[0];
             let split = |i| facet.split(albedo::node(i));
             let r = albedo::mean_of_spectra(&std::array::from_fn(|i| split(i).reflected));
             let t = albedo::mean_of_spectra(&std::array::from_fn(|i| split(i).transmitted));
@@ -259,7 +267,7 @@ impl<const N: usize> Multiple<N> {
         }
         let near = albedo::of_lanes(facet.eta, |eta| roughness.dielectric_loss(eta));
         let far = albedo::of_lanes(facet.eta, |eta| roughness.dielectric_loss(1.0 / eta));
-        let (near_mean, far_mean) = (albedo::mean_of_spectra(&near), albedo::mean_of_spectra(&far));
+        let (near_mean, far_mean) = (mean(&near), mean(&far));
         let x = SampledSpectrum::<N>::from_fn(|i| {
             let greater = near_mean[i].max(far_mean[i]);
             if greater > 0.0 { (1.0 - fresnel::dielectric_mean(facet.eta[i])) * far_mean[i] / greater } else { 0.0 }

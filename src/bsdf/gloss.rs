@@ -79,6 +79,6 @@ impl<const N: usize> Gloss<N> {
     /// Albedo for a direction, for the choice of lobes.
     #[inline]
     pub(super) fn importance(&self, at: &At) -> f32 {
-        (self.weight * (at.of_spectra(&self.albedo) * self.color).mean()).max(0.0)
+        self.weight * (at.of_spectra(&self.albedo) * self.color).mean()
     }
 }

@@ -7,8 +7,10 @@
 //! K. Eto & Y. Tokuyoshi, SIGGRAPH Asia 2023 (caps bounded to what reflects above the horizon).
 
 use glam::{Vec2, Vec3};
-
 use std::f32::consts::PI;
+
+use super::albedo::{self, At, NODES};
+use crate::spectrum::SampledSpectrum;
 
 /// A GGX distribution.
 #[derive(Clone, Copy, Debug)]
@@ -23,9 +25,49 @@ impl Ggx {
         Self { alpha: Vec2::from(alpha).clamp(Vec2::splat(SHARPEST), Vec2::ONE) }
     }
 
-    /// α of the isotropic distribution whose directional albedo stands for this one's.
+    /// α of the isotropic distribution whose directional albedo stands for this one's: the root of the mean of α², which masks a direction
+    /// of average azimuth.
     pub(super) fn mean_alpha(&self) -> f32 {
-        (self.alpha.x * self.alpha.y).sqrt()
+        (0.5 * self.alpha.length_squared()).sqrt()
+    }
+
+    /// The nodes at which albedos of the isotropic distribution of [`Self::mean_alpha`] stand for this one's in direction `w`: those of the
+    /// cosine at which it masks as much, as its Λ is a function of α tan θ. `upright` is the answer where α has no direction.
+    #[inline]
+    pub(super) fn at(&self, w: Vec3, upright: &At) -> At {
+        if self.is_isotropic() {
+            return *upright;
+        }
+        let (x, y) = (self.alpha.x * w.x, self.alpha.y * w.y);
+        let across = (x * x + y * y) / (0.5 * self.alpha.length_squared());
+        At::cosine(w.z.abs() / (w.z * w.z + across).sqrt())
+    }
+
+    fn is_isotropic(&self) -> bool {
+        (self.alpha.x - self.alpha.y).abs() <= 1e-6 * self.alpha.x
+    }
+
+    /// The mean over azimuths of a function that is looked up by [`Self::at`].
+    pub(super) fn over_azimuths<const N: usize>(
+        &self,
+        slice: &[SampledSpectrum<N>; NODES],
+    ) -> [SampledSpectrum<N>; NODES] {
+        /// Of a quarter turn; the function is smooth in the azimuth and even about both axes.
+        const AZIMUTHS: usize = 8;
+        if self.is_isotropic() {
+            return *slice;
+        }
+        std::array::from_fn(|i| {
+            let mu = albedo::node(i);
+            let sine = (1.0 - mu * mu).max(0.0).sqrt();
+            let mut sum = SampledSpectrum::ZERO;
+            for k in 0..AZIMUTHS {
+                let phi = 0.5 * PI * (k as f32 + 0.5) / AZIMUTHS as f32;
+                let w = Vec3::new(sine * libm::cosf(phi), sine * libm::sinf(phi), mu);
+                sum += self.at(w, &At::cosine(mu)).of_spectra(slice);
+            }
+            sum * (1.0 / AZIMUTHS as f32)
+        })
     }
 
     /// D(h), per steradian.

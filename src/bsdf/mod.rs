@@ -169,7 +169,7 @@ impl<const N: usize> Bsdf<N> {
                     pdf: SampledSpectrum::ONE,
                 });
             }
-            Kind::Clear(facet) => return facet.sample(wo.z, u_lobe, 1.0, SampledSpectrum::ONE),
+            Kind::Clear(facet) => return facet.sample(wo.z, u_lobe, 1.0, [SampledSpectrum::ONE; 2]),
             Kind::Stack(stack) => return stack.sample(wo, u_lobe, u),
         };
         let wi = sample_cosine(u);

@@ -40,7 +40,7 @@ impl<const N: usize> SheenLobe<N> {
     /// Albedo for a direction, for the choice of lobes.
     #[inline]
     pub(super) fn importance(&self, at: &At) -> f32 {
-        (self.weight * self.color.mean() * at.of(&self.albedo)).max(0.0)
+        self.weight * self.color.mean() * at.of(&self.albedo)
     }
 }
 

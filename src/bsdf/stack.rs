@@ -168,7 +168,7 @@ impl<const N: usize> Stack<N> {
             at,
             below_sheen: passed(&self.below_sheen),
             below_coat: passed(&self.below_coat),
-            absorbed: self.coat.as_ref().map_or(1.0, |coat| coat.absorption(wo.z, wo.z).mean()),
+            absorbed: self.coat.as_ref().map_or(1.0, |coat| coat.absorption(wo.z, Some(wo.z)).mean()),
         }
     }
 
@@ -187,7 +187,7 @@ impl<const N: usize> Stack<N> {
                 pdf: SampledSpectrum::splat(chosen),
             })
         };
-        let through = self.absorption(wo.z, wo.z) * view.below_coat;
+        let through = self.absorption(wo.z, Some(wo.z)) * view.below_coat;
         let off = |ggx: super::microfacet::Ggx| mirror(wo, ggx.sample_reflecting(wo, u));
         let (wi, event) = match lobe {
             SHEEN => (diffuse::sample_cosine(u), Event::Diffuse),
@@ -225,13 +225,20 @@ impl<const N: usize> Stack<N> {
                 (if below { Vec3::new(wi.x, wi.y, -wi.z) } else { wi }, Event::Diffuse)
             }
             _ => match self.glass.as_ref()? {
-                Glass::Smooth(facet) => return facet.sample(wo.z, rest, chosen, through),
+                Glass::Smooth(facet) => {
+                    let once = self.absorption(wo.z, None) * view.below_coat;
+                    return facet.sample(wo.z, rest, chosen, [through, once]);
+                }
                 Glass::Rough(rough) => {
                     let wi = rough.sample(wo, &view.at, rest, u)?;
                     (wi, if wi.z > 0.0 { Event::GlossyReflection } else { Event::GlossyTransmission })
                 }
             },
         };
+        // Facets that mirror into the surface: of what other lobes transmit that is no sample.
+        if wi.z <= 0.0 && matches!(lobe, COAT | METAL | GLOSS) {
+            return None;
+        }
         let evaluated = self.evaluate_from(&view, &choices, wo, wi);
         let pdf = evaluated.pdf.hero();
         if !(pdf > 0.0 && pdf.is_finite()) {
@@ -253,7 +260,7 @@ impl<const N: usize> Stack<N> {
         self.evaluate_from(&view, &self.choices(&view), wo, wi)
     }
 
-    fn absorption(&self, mu_o: f32, mu_i: f32) -> SampledSpectrum<N> {
+    fn absorption(&self, mu_o: f32, mu_i: Option<f32>) -> SampledSpectrum<N> {
         self.coat.as_ref().map_or(SampledSpectrum::ONE, |coat| coat.absorption(mu_o, mu_i))
     }
 
@@ -263,7 +270,7 @@ impl<const N: usize> Stack<N> {
             return evaluated;
         }
         let mut pdf = 0.0;
-        let absorption = self.absorption(wo.z, wi.z.abs());
+        let absorption = self.absorption(wo.z, (wi.z > 0.0).then_some(wi.z));
         if wi.z > 0.0 {
             let pair = Pair { wo, wi, h: halfway(wo, wi), at_o: view.at, at_i: At::cosine(wi.z) };
             let passed = |slice: &Option<Slice>| slice.as_ref().map_or(1.0, |s| pair.at_i.of(s).clamp(0.0, 1.0));

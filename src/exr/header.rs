@@ -14,6 +14,7 @@ use super::{Head, LAYERS, SAMPLE_RANGE, UNIT};
 use crate::error::{Error, Result};
 use crate::film::aov::{self, SampleType};
 use crate::film::metadata::{Attribute, Metadata};
+use crate::film::spectral::Bins;
 use crate::film::{SampleRange, Window};
 
 const MAGIC: u32 = 20_000_630;
@@ -141,6 +142,8 @@ pub(super) struct Decoded {
 struct LayerEntry {
     name: String,
     aov: String,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    argument: String,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     sums: bool,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -239,6 +242,7 @@ fn own_attributes(head: &Head, channels: &[Channel], compression: u8) -> Result<
         .map(|kind| LayerEntry {
             name: kind.name.clone(),
             aov: kind.aov.name.to_owned(),
+            argument: kind.argument.clone(),
             sums: kind.sums,
             half: kind.half,
         })
@@ -485,20 +489,26 @@ fn understand(path: &Path, mut attributes: Vec<(String, String, Vec<u8>)>) -> Re
     let entries: Vec<LayerEntry> =
         serde_json::from_slice(&layers).map_err(|e| damaged(path, format!("attribute `{LAYERS}`: {e}")))?;
     let mut layers = Vec::with_capacity(entries.len());
-    for LayerEntry { name, aov, sums, half } in entries {
+    for LayerEntry { name, aov, argument, sums, half } in entries {
         let row = aov::AOVS.iter().find(|row| row.name == aov).ok_or_else(|| {
             Error::file(
                 path,
                 format!("layer `{name}` has the AOV `{aov}`, unknown to this version: use the abbe that wrote it"),
             )
         })?;
+        let row = if row.name == aov::SPECTRAL {
+            let bins = Bins::parse(&argument).map_err(|_| damaged(path, format!("layer `{name}` has no bins")))?;
+            bins.row(&name)
+        } else {
+            row
+        };
         if sums && !row.has_sums() {
             return Err(damaged(path, format!("layer `{name}` cannot have sums")));
         }
         if half && row.sample == SampleType::Uint {
             return Err(damaged(path, format!("layer `{name}` cannot be in half floats")));
         }
-        layers.push(LayerKind { aov: row, name, sums, half });
+        layers.push(LayerKind { aov: row, name, argument, sums, half });
     }
     let samples = String::from_utf8(need(SAMPLE_RANGE, "string")?)
         .ok()

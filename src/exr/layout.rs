@@ -27,6 +27,8 @@ pub struct LayerKind {
     pub aov: &'static Aov,
     /// Its EXR layer name.
     pub name: String,
+    /// What its AOV is told with its name.
+    pub argument: String,
     /// Whether exact sums are kept.
     pub sums: bool,
     /// Whether values are stored in 16 bits.
@@ -36,12 +38,22 @@ pub struct LayerKind {
 impl LayerKind {
     /// The kind of `layer`.
     pub fn of(layer: &Layer) -> Self {
-        Self { aov: layer.aov, name: layer.name.clone(), sums: layer.sums.is_some(), half: layer.half }
+        Self {
+            aov: layer.aov,
+            name: layer.name.clone(),
+            argument: layer.argument.clone(),
+            sums: layer.sums.is_some(),
+            half: layer.half,
+        }
     }
 
     /// A layer of this kind without values.
     pub fn layer(&self, pixels: usize) -> Layer {
-        Layer { half: self.half, ..Layer::new(self.aov, self.name.clone(), pixels, self.sums) }
+        Layer {
+            half: self.half,
+            argument: self.argument.clone(),
+            ..Layer::new(self.aov, self.name.clone(), pixels, self.sums)
+        }
     }
 
     /// What errors and attributes call the layer: its name, or its AOV's where that is empty.

@@ -154,8 +154,12 @@ pub const COLOR_CLEAN: &str = "color_clean";
 pub const VARIANCE: &str = "variance";
 /// Samples that a pixel got.
 pub const SAMPLE_COUNT: &str = "sample_count";
-/// AOVs of which there can be many, told apart by what stands after a colon.
-pub const TAKES_ARGUMENT: &[&str] = &["light_group", "lpe"];
+/// Spectral bins.
+pub const SPECTRAL: &str = "spectral";
+/// The part of the beauty that comes from a group of lights.
+pub const LIGHT_GROUP: &str = "light_group";
+/// The part of the beauty whose light paths an expression describes.
+pub const LPE: &str = "lpe";
 /// What colours of light are measured in.
 const RADIANCE: &str = "radiance";
 
@@ -166,6 +170,16 @@ pub const INTERNAL_TRANSMITTANCE: &str = "internal_transmittance";
 pub const MOTION: &str = "motion";
 /// Motion on screen of what is seen through glass, which is traced again at the frame and at the next one.
 pub const REFRACTED_MOTION: &str = "refracted_motion";
+
+/// What an AOV has to be told with its name (`NAME:ARGUMENT`), in words; `None` if nothing.
+pub fn argument(aov: &Aov) -> Option<&'static str> {
+    match aov.name {
+        SPECTRAL => Some("LO:HI:WIDTH in nm, such as 400:700:10"),
+        LIGHT_GROUP => Some("the name of a light group"),
+        LPE => Some("a light path expression"),
+        _ => None,
+    }
+}
 
 /// Whether an AOV is that of a surface's color.
 pub fn is_albedo(aov: &Aov) -> bool {
@@ -190,8 +204,8 @@ pub static AOVS: &[Aov] = &[
     light("reflection", RGB, RADIANCE, "part of color that the first surface reflects, rough or smooth"),
     light("transmission", RGB, RADIANCE, "part of color that the first surface lets through, rough or smooth"),
     light("emission", RGB, RADIANCE, "part of color that is seen by itself: lights, domes, emitting surfaces"),
-    light("light_group", RGB, RADIANCE, "part of color that the lights of a group send: light_group:NAME"),
-    light("lpe", RGB, RADIANCE, "part of color whose paths match a light path expression: lpe:EXPRESSION"),
+    light(LIGHT_GROUP, RGB, RADIANCE, "part of color that the lights of a group send: light_group:NAME"),
+    light(LPE, RGB, RADIANCE, "part of color whose paths match a light path expression: lpe:EXPRESSION"),
     Aov {
         unit: "radiance²",
         merge: Merge::Variance,
@@ -207,6 +221,12 @@ pub static AOVS: &[Aov] = &[
         merge: Merge::Count,
         ..light(SAMPLE_COUNT, I, "count", "samples that the pixel got")
     },
+    light(
+        SPECTRAL,
+        &["w550"],
+        "radiance/nm",
+        "mean radiance per nm in bins of the band, one channel each, called by the middle of its bin in nm",
+    ),
     mean(
         "ddirection_dlambda",
         XYZ,

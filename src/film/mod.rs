@@ -6,6 +6,7 @@
 pub mod aov;
 pub mod metadata;
 pub mod pixel;
+pub mod spectral;
 pub mod sum;
 
 use aov::{Aov, SampleType};
@@ -95,6 +96,8 @@ pub struct Layer {
     pub aov: &'static Aov,
     /// Its EXR layer name: the AOV's, unless the stage's RenderVar says otherwise. Empty: bare channels.
     pub name: String,
+    /// What the AOV is told with its name, as [`aov::argument`] says; empty for most.
+    pub argument: String,
     /// Whether files store the values in 16 bits: a request of the stage, kept only where no digits are lost that matter.
     pub half: bool,
     /// The pixels.
@@ -116,11 +119,16 @@ impl Layer {
         let valid = aov.has_validity.then(|| vec![0.0; pixels]);
         let sums = (keep_sums && aov.has_sums())
             .then(|| Sums { values: vec![0.0; pixels * aov.sum_count()], counts: vec![0; pixels] });
-        Self { aov, name, half: false, values, valid, sums }
+        Self { aov, name, argument: String::new(), half: false, values, valid, sums }
     }
 }
 
 impl Layer {
+    /// By what it is found in a film: its AOV's name; that of the layer where an AOV can stand several times.
+    pub fn key(&self) -> &str {
+        if self.argument.is_empty() || self.aov.name == aov::SPECTRAL { self.aov.name } else { &self.name }
+    }
+
     /// Keeps sums from now on, if there are any of such an AOV.
     pub fn keep_sums(&mut self) {
         if self.sums.is_none() && self.aov.has_sums() {
@@ -149,8 +157,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// The layer of the AOV called `name`.
+    /// The layer with the [key](Layer::key) `name`: its AOV's for most.
     pub fn layer(&self, name: &str) -> Option<&Layer> {
-        self.layers.iter().find(|layer| layer.aov.name == name)
+        self.layers.iter().find(|layer| layer.key() == name)
     }
 }

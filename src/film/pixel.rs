@@ -1,8 +1,10 @@
 //! One pixel in the making: samples go in by their index, a finished value per layer comes out.
 
 use super::aov::{self, Aov, Merge};
+use super::spectral::Bins;
 use super::sum::{self, TreeSum};
 use super::{Layer, Values};
+use crate::spectrum::{SampledSpectrum, Wavelengths};
 
 /// A value that errors are compared with at least: a hundredth of white, below which an image is black to the eye.
 pub const FLOOR: f64 = 0.01;
@@ -13,6 +15,10 @@ pub struct PixelAccumulator {
     slots: Vec<Slot>,
     /// Layers that are made of the beauty's samples.
     color: Vec<usize>,
+    /// Layers of spectral bins.
+    spectral: Vec<(usize, Bins)>,
+    /// A sample's bins.
+    bins: Vec<f64>,
     first_sample: u32,
     /// One past the last sample that was begun.
     next_sample: u32,
@@ -63,7 +69,40 @@ impl PixelAccumulator {
         };
         let slots = aovs.into_iter().enumerate().map(slot).collect();
         let clamp = f64::INFINITY;
-        Self { slots, color, first_sample, next_sample: first_sample, clamp, non_finite: 0, clamped: 0 }
+        Self {
+            slots,
+            color,
+            spectral: Vec::new(),
+            bins: Vec::new(),
+            first_sample,
+            next_sample: first_sample,
+            clamp,
+            non_finite: 0,
+            clamped: 0,
+        }
+    }
+
+    /// The same, with the bins of layers of spectra: their indices and what they are.
+    pub fn with_bins(self, spectral: Vec<(usize, Bins)>) -> Self {
+        Self { spectral, ..self }
+    }
+
+    /// Adds the next sample of the beauty's spectrum, times `scale`, to every layer of spectral bins.
+    pub fn add_spectrum<const N: usize>(
+        &mut self,
+        radiance: SampledSpectrum<N>,
+        wavelengths: &Wavelengths<N>,
+        scale: f64,
+    ) {
+        for k in 0..self.spectral.len() {
+            let (layer, bins) = self.spectral[k];
+            let mut values = std::mem::take(&mut self.bins);
+            values.clear();
+            values.resize(bins.count(), 0.0);
+            bins.estimate(radiance, wavelengths, &mut values);
+            self.add_channels(layer, values.iter().map(|value| value * scale));
+            self.bins = values;
+        }
     }
 
     /// The same with samples of the beauty scaled down to at most `clamp` in R, G and B, if there is one.

@@ -123,7 +123,7 @@ pub struct Task<'a> {
     pub camera: &'a Camera,
     /// One AOV per layer, in the film's order.
     pub aovs: &'a [&'static Aov],
-    /// What each layer's AOV asks for besides: a light path expression, a light group; empty if nothing.
+    /// What each AOV is told with its name, as [`argument`](crate::film::aov::argument) says; empty for most.
     pub arguments: &'a [String],
     /// What the layers need.
     pub needs: Needs,

@@ -16,7 +16,7 @@ use super::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
 use super::{Integrator, PreparedIntegrator, Task, Worker, surface};
 use crate::bsdf::{Bsdf, Interface, Scattered};
 use crate::error::Result;
-use crate::film::aov::{AOVS, Aov, COLOR, SAMPLE_COUNT, VARIANCE};
+use crate::film::aov::{AOVS, Aov, COLOR, SAMPLE_COUNT, SPECTRAL, VARIANCE};
 use crate::film::pixel::PixelAccumulator;
 use crate::geometry::Ray;
 use crate::lighting::{Lighting, Receiver};
@@ -41,7 +41,7 @@ impl Integrator for Reference {
     }
 
     fn aovs(&self) -> Vec<&'static Aov> {
-        AOVS.iter().filter(|aov| matches!(aov.name, COLOR | VARIANCE | SAMPLE_COUNT)).collect()
+        AOVS.iter().filter(|aov| matches!(aov.name, COLOR | VARIANCE | SAMPLE_COUNT | SPECTRAL)).collect()
     }
 
     fn transports_light(&self) -> bool {
@@ -94,8 +94,10 @@ impl Worker for BruteForce<'_> {
             self.media.restart(wavelengths);
             let mut walk = Walk::new(&self.prepared.follower, &ray);
             let (radiance, alpha) = self.follow(&mut walk, &wavelengths, &mut numbers);
-            let DVec3 { x, y, z } = self.color_from_xyz * sensor::xyz(SampledSpectrum([radiance]), &wavelengths);
-            out.add_color([x, y, z, alpha]);
+            let radiance = SampledSpectrum([radiance]);
+            let DVec3 { x, y, z } = self.color_from_xyz * sensor::xyz(radiance, &wavelengths);
+            let scale = out.add_color([x, y, z, alpha]);
+            out.add_spectrum(radiance, &wavelengths, scale);
         }
     }
 

@@ -16,13 +16,13 @@ const LARGEST_EXTINCTION: f64 = 1e3;
 
 /// A curve of straight pieces through (nm, value), constant outside.
 #[derive(Clone, Debug, PartialEq)]
-struct Pieces {
+pub(super) struct Pieces {
     points: Vec<[f64; 2]>,
 }
 
 impl Pieces {
     /// Checks the wavelengths; `check` names what is wrong with a value.
-    fn new(points: &[[f64; 2]], check: impl Fn(f64) -> Option<String>) -> Result<Self, String> {
+    pub(super) fn new(points: &[[f64; 2]], check: impl Fn(f64) -> Option<String>) -> Result<Self, String> {
         if points.len() < 2 {
             return Err(format!("the table has {} entries, it needs two or more: (nm, value) each", points.len()));
         }
@@ -52,7 +52,7 @@ impl Pieces {
         Ok(Self { points: points.to_vec() })
     }
 
-    fn at(&self, wavelength: Wavelength) -> f64 {
+    pub(super) fn at(&self, wavelength: Wavelength) -> f64 {
         let nm = wavelength.nanometers();
         let above = self.points.partition_point(|point| point[0] <= nm);
         match (above.checked_sub(1).map(|below| self.points[below]), self.points.get(above)) {

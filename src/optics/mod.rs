@@ -8,6 +8,7 @@ pub mod absorption;
 pub mod catalog;
 pub mod dispersion;
 pub mod media;
+pub mod reflectance;
 
 pub use absorption::{Absorption, Extinction};
 pub use dispersion::Dispersion;

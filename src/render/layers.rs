@@ -10,6 +10,7 @@ use super::settings::Attributes;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::{self, Aov, Family, SampleType};
+use crate::film::spectral::{self, Bins};
 use crate::integrator::Registry;
 use crate::integrator::light_path::Expression;
 use crate::scene::description::{Product, Var};
@@ -33,6 +34,11 @@ const DEFAULT_AOVS: &[&str] = &[
 /// The beauty, whose channels stand bare.
 const BEAUTY: &str = aov::COLOR;
 
+/// Band of spectral bins unless chosen, nm: what displays and eyes look at.
+const SPECTRAL_BAND: [f64; 2] = [400.0, 700.0];
+/// Width of a spectral bin unless chosen, nm.
+const SPECTRAL_WIDTH: f64 = 10.0;
+
 /// Parameters of a RenderVar's driver that are understood, with those that have no meaning here by their usual value.
 const VAR_PARAMETERS: &[&str] = &["name", "format", "channel_prefix", "clearValue", "multiSampled"];
 
@@ -42,11 +48,11 @@ pub struct PlannedLayer {
     /// Its AOV.
     #[serde(serialize_with = "aov_name")]
     pub aov: &'static Aov,
-    /// What the AOV asks for besides, a light group or a light path expression; empty if nothing.
-    #[serde(skip_serializing_if = "String::is_empty")]
-    pub argument: String,
     /// EXR layer name; empty for bare channels.
     pub name: String,
+    /// What the AOV is told with its name.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub argument: String,
     /// Stored in 16 bits.
     pub half: bool,
 }
@@ -57,7 +63,8 @@ fn aov_name<S: serde::Serializer>(aov: &&'static Aov, serializer: S) -> Result<S
 
 impl PlannedLayer {
     fn plain(aov: &'static Aov) -> Self {
-        Self { aov, argument: String::new(), name: layer_name(aov.name, aov.name, ""), half: aov.is_half_by_default() }
+        let name = layer_name(aov.name, aov.name, "");
+        Self { aov, name, argument: String::new(), half: aov.is_half_by_default() }
     }
 }
 
@@ -96,19 +103,22 @@ pub(super) fn layers(
     };
     let mut layers: Vec<PlannedLayer> = Vec::new();
     if let Some(names) = &request.aovs {
-        for asked in names {
-            let place = || format!("--aov {asked}");
-            let (own_name, asked) = named(asked);
-            let (name, argument) = with_argument(asked);
-            let aov = find(name).ok_or_else(|| Error::usage(place(), unavailable(name)))?;
-            check_argument(aov, argument).map_err(|problem| Error::usage(place(), problem))?;
-            if layers.iter().any(|layer| layer.aov.name == aov.name && layer.argument == argument) {
+        for text in names {
+            let asked = Asked::of(text);
+            let place = format!("--aov {text}");
+            let aov = find(asked.aov).ok_or_else(|| Error::usage(&place, unavailable(asked.aov)))?;
+            let mut layer = asked.layer(aov, names.len() == 1).map_err(|problem| Error::usage(&place, problem))?;
+            if layers.iter().any(|known| known.aov.name == layer.aov.name && known.argument == layer.argument) {
                 continue;
             }
-            let mut layer = PlannedLayer { argument: argument.to_owned(), ..PlannedLayer::plain(aov) };
-            if !argument.is_empty() {
-                let wanted = own_name.map_or_else(|| argument_name(aov, argument), str::to_owned);
-                layer.name = unused_name(&layers, wanted);
+            if asked.name.is_none() && !layer.argument.is_empty() {
+                layer.name = unused_name(&layers, layer.name);
+            }
+            if layers.iter().any(|known| known.name == layer.name) {
+                return Err(Error::usage(
+                    place,
+                    format!("the layer '{}' is asked for twice: give it another NAME=", layer.name),
+                ));
             }
             layers.push(layer);
         }
@@ -118,27 +128,36 @@ pub(super) fn layers(
         return Ok((chosen, layers));
     }
     for var in product.map_or(&[][..], |p| &p.vars) {
-        let source = match source(var) {
-            Ok(source) => source,
+        let asked = match source(var) {
+            Ok(asked) => asked,
             Err(problem) => {
                 diagnostics.warn("unavailable-render-var", &var.path, format!("{problem}: it is left out"));
                 continue;
             }
         };
-        let (source, argument) = source;
-        let Some(aov) = find(source) else {
-            diagnostics.warn("unavailable-render-var", &var.path, format!("{}: it is left out", unavailable(source)));
+        let Some(aov) = find(asked.aov) else {
+            let problem = match asked.aov {
+                aov::LPE => format!(
+                    "asks for the light path expression '{}', which needs light transport that tells paths apart: '{chosen}' \
+                     does not",
+                    asked.argument
+                ),
+                name => unavailable(name),
+            };
+            diagnostics.warn("unavailable-render-var", &var.path, format!("{problem}: it is left out"));
             continue;
         };
-        if let Err(problem) = check_argument(aov, argument) {
-            diagnostics.warn(
-                "unavailable-render-var",
-                &var.path,
-                format!("asks for '{argument}', which {problem}: it is left out"),
-            );
-            continue;
-        }
+        let is_alone = product.is_some_and(|p| p.vars.len() == 1);
+        let PlannedLayer { aov, name: usual, argument, .. } = match asked.layer(aov, is_alone) {
+            Ok(layer) => layer,
+            Err(problem) => {
+                diagnostics.warn("unavailable-render-var", &var.path, format!("{problem}: it is left out"));
+                continue;
+            }
+        };
         let name = match text(var, "name") {
+            // A file of spectra alone is one of their layout, however its variable is called.
+            "" if usual == spectral::EMISSION => spectral::EMISSION,
             "" => var.name.as_str(),
             name => name,
         };
@@ -154,61 +173,97 @@ pub(super) fn layers(
                 ),
             ));
         }
-        layers.push(PlannedLayer { aov, argument: argument.to_owned(), name, half });
+        let aov = if argument.is_empty() { aov } else { with_bins(aov, &argument, &name) };
+        layers.push(PlannedLayer { aov, name, argument, half });
     }
     if layers.is_empty() {
         let default = if integrator.transports_light() { &[BEAUTY][..] } else { DEFAULT_AOVS };
         layers = default.iter().filter_map(|name| find(name)).map(PlannedLayer::plain).collect();
         if layers.is_empty() {
-            layers = offered.into_iter().map(PlannedLayer::plain).collect();
+            let plain = offered.into_iter().filter(|aov| aov::argument(aov).is_none());
+            layers = plain.map(PlannedLayer::plain).collect();
         }
     }
     Ok((chosen, layers))
 }
 
-/// The integrator that nobody chose: with light transport if some AOV asks for light.
-fn default_integrator(request: &Request, product: Option<&Product>) -> &'static str {
-    let is_light =
-        |asked: &str| aov::find(with_argument(named(asked).1).0).is_some_and(|aov| aov.family == Family::Transport);
-    let asks = match &request.aovs {
-        Some(names) => names.iter().any(|name| is_light(name)),
-        None => product.is_some_and(|p| p.vars.iter().any(|var| source(var).is_ok_and(|(name, _)| is_light(name)))),
-    };
-    if asks { "path" } else { "differentials" }
+/// An AOV as it is asked for: `[NAME=]AOV[:ARGUMENT]`.
+struct Asked<'a> {
+    /// The layer's name, if it is told.
+    name: Option<&'a str>,
+    aov: &'a str,
+    argument: std::borrow::Cow<'a, str>,
 }
 
-/// `LAYER=AOV`: a name of its own for an AOV with an argument.
-fn named(asked: &str) -> (Option<&str>, &str) {
-    match asked.split_once('=') {
-        Some((name, rest)) if !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_') => {
-            (Some(name), rest)
+impl<'a> Asked<'a> {
+    fn of(text: &'a str) -> Self {
+        let (name, rest) = match text.split_once('=') {
+            Some((name, rest)) if !name.contains(':') => (Some(name), rest),
+            _ => (None, text),
+        };
+        let (aov, argument) = rest.split_once(':').unwrap_or((rest, ""));
+        Self { name, aov, argument: argument.into() }
+    }
+
+    /// Takes the bins that a variable has as attributes of its own, if it asks for bins.
+    fn take_bins(&mut self, var: &Var) {
+        if aov::canonical_name(self.aov) == aov::SPECTRAL && self.argument.is_empty() {
+            let numbers = |name: &str| match var.abbe.get(name).map(|a| &a.value) {
+                Some(serde_json::Value::Array(list)) => list.iter().filter_map(serde_json::Value::as_f64).collect(),
+                Some(value) => value.as_f64().into_iter().collect(),
+                None => Vec::new(),
+            };
+            let band = <[f64; 2]>::try_from(numbers("abbe:spectral:band")).ok();
+            let [low, high] = band.filter(|[low, high]| low < high).unwrap_or(SPECTRAL_BAND);
+            let width = numbers("abbe:spectral:binWidth").first().copied().unwrap_or(SPECTRAL_WIDTH);
+            self.argument = format!("{low}:{high}:{width}").into();
         }
-        _ => (None, asked),
+    }
+
+    /// The layer of `aov`; one of spectra `is_alone` in its file is called as their layout has it.
+    fn layer(&self, aov: &'static Aov, is_alone: bool) -> Result<PlannedLayer, String> {
+        let plain = PlannedLayer::plain(aov);
+        let argument = match (aov::argument(aov), &*self.argument) {
+            (None, "") => String::new(),
+            (None, argument) => return Err(format!("'{}' takes no argument, and ':{argument}' is one", aov.name)),
+            (Some(_), "") if aov.name == aov::SPECTRAL => {
+                let [low, high] = SPECTRAL_BAND;
+                format!("{low}:{high}:{SPECTRAL_WIDTH}")
+            }
+            (Some(wanted), "") => return Err(format!("'{0}' needs an argument: {0}:ARGUMENT, {wanted}", aov.name)),
+            (Some(_), argument) => argument.to_owned(),
+        };
+        match aov.name {
+            aov::SPECTRAL => {
+                Bins::parse(&argument).map_err(|error| error.to_string())?;
+            }
+            aov::LIGHT_GROUP | aov::LPE => {
+                Expression::of_aov(aov.name, &argument)?;
+            }
+            _ => {}
+        }
+        let name = match (self.name, aov.name) {
+            (Some(name), _) => layer_name(aov.name, name, ""),
+            (None, aov::SPECTRAL) if is_alone => spectral::EMISSION.to_owned(),
+            (None, aov::LIGHT_GROUP) => format!("{}_{}", aov.name, plain_letters(&argument)),
+            (None, _) => plain.name,
+        };
+        let aov = with_bins(aov, &argument, &name);
+        Ok(PlannedLayer { aov, name, argument, ..plain })
     }
 }
 
-/// `AOV:ARGUMENT`: light groups and light path expressions.
-fn with_argument(asked: &str) -> (&str, &str) {
-    match asked.split_once(':') {
-        Some((name, argument)) if aov::TAKES_ARGUMENT.contains(&name) => (name, argument),
-        _ => (asked, ""),
+/// The row of `aov` with the channels of its bins, if it has some.
+fn with_bins(aov: &'static Aov, argument: &str, name: &str) -> &'static Aov {
+    match (aov.name, Bins::parse(argument)) {
+        (aov::SPECTRAL, Ok(bins)) => bins.row(name),
+        _ => aov,
     }
 }
 
-fn check_argument(aov: &Aov, argument: &str) -> Result<(), String> {
-    match aov::TAKES_ARGUMENT.contains(&aov.name) {
-        true => Expression::of_aov(aov.name, argument).map(drop),
-        false => Ok(()),
-    }
-}
-
-/// What a layer with an argument is called: after the light group, or just by its AOV.
-fn argument_name(aov: &Aov, argument: &str) -> String {
-    if aov.name != "light_group" {
-        return aov.name.to_owned();
-    }
-    let clean = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-    format!("{}_{}", aov.name, argument.chars().map(clean).collect::<String>())
+/// `text` with an underscore for everything that no layer's name should have.
+fn plain_letters(text: &str) -> String {
+    text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }
 
 /// `wanted`, or the first of `wanted_2`, `wanted_3` … that no layer has.
@@ -221,29 +276,44 @@ fn unused_name(layers: &[PlannedLayer], wanted: String) -> String {
     names.find(|name| is_free(name)).expect("there are fewer layers than numbers")
 }
 
+/// The integrator that nobody chose: with light transport if some AOV asks for light.
+fn default_integrator(request: &Request, product: Option<&Product>) -> &'static str {
+    let is_light = |name: &str| aov::find(name).is_some_and(|aov| aov.family == Family::Transport);
+    let asks = match &request.aovs {
+        Some(names) => names.iter().any(|name| is_light(Asked::of(name).aov)),
+        None => product.is_some_and(|p| p.vars.iter().any(|var| source(var).is_ok_and(|asked| is_light(asked.aov)))),
+    };
+    if asks { "path" } else { "differentials" }
+}
+
 fn text<'a>(var: &'a Var, name: &str) -> &'a str {
     var.driver.get(name).and_then(|a| a.value.as_str()).unwrap_or("")
 }
 
-/// The AOV that a variable names and its argument, or why it names none. Hydra's prefixes say what `sourceType` says too.
-fn source(var: &Var) -> Result<(&str, &str), String> {
+/// The AOV that a variable asks for, or why it asks for none. Hydra's prefixes say what `sourceType` says too.
+fn source(var: &Var) -> Result<Asked<'_>, String> {
     let name = if var.source_name.is_empty() { &var.name } else { &var.source_name };
     let (kind, name) = match name.split_once(':') {
         Some(("primvars", rest)) => ("primvar", rest),
         Some(("lpe", rest)) => ("lpe", rest),
         _ => (var.source_type.as_str(), name.as_str()),
     };
-    match kind {
+    let mut asked = match kind {
         "primvar" => match aov::canonical_name(name) {
-            "uv" => Ok(("uv", "")),
-            "normals" | "normal" => Ok(("normal", "")),
-            _ => Err(format!(
-                "asks for the primvar '{name}', and of primvars only texture coordinates (st) and normals are written"
-            )),
+            "uv" => Asked::of("uv"),
+            "normals" | "normal" => Asked::of("normal"),
+            _ => {
+                return Err(format!(
+                    "asks for the primvar '{name}', and of primvars only texture coordinates (st) and normals are written"
+                ));
+            }
         },
-        "lpe" if aov::canonical_name(name) != BEAUTY => Ok(("lpe", name)),
-        _ => Ok(with_argument(name)),
-    }
+        "lpe" if aov::canonical_name(name) == BEAUTY => Asked::of(BEAUTY),
+        "lpe" => Asked { name: None, aov: aov::LPE, argument: name.into() },
+        _ => Asked { name: None, ..Asked::of(name) },
+    };
+    asked.take_bins(var);
+    Ok(asked)
 }
 
 /// Whether a layer is stored in half floats, as its variable asks for by `format`, else by `dataType`.

@@ -4,8 +4,9 @@ use serde_json::json;
 
 use super::Plan;
 use crate::camera::{Camera, linear_exposure_scale};
-use crate::film::aov::{Family, Merge};
+use crate::film::aov::{Family, Merge, SPECTRAL};
 use crate::film::metadata::{Attribute, Metadata};
+use crate::film::spectral;
 use crate::scene::Scene;
 use crate::scene::description;
 use crate::spectrum::Wavelength;
@@ -16,8 +17,8 @@ use glam::{DMat4, DVec4};
 /// How a render ended.
 pub(super) struct Outcome {
     pub(super) complete: bool,
-    /// Samples per pixel, or the most that a pixel could have.
-    pub(super) samples: u32,
+    /// Samples per pixel of the whole render, or the most that a pixel could have.
+    pub(super) total: u32,
     pub(super) reached_limit: bool,
     /// Samples that were scaled down.
     pub(super) clamped: u64,
@@ -64,8 +65,7 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, outcome: &Ou
     if let Some([open, close]) = plan.shutter {
         set("abbe:shutter", Attribute::Text(format!("{open}:{close} frames from the time code")));
     }
-    let total = if outcome.reached_limit { outcome.samples } else { plan.samples.total };
-    set("abbe:samples", Attribute::Int(total as i32));
+    set("abbe:samples", Attribute::Int(outcome.total as i32));
     if let Some(target) = plan.error_target {
         set("abbe:errorTarget", Attribute::Double(target));
     }
@@ -76,7 +76,7 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, outcome: &Ou
             Attribute::Text(format!(
                 "{} s were over after {} of {} samples: another run may end with others; the same number of samples gives the same bits",
                 plan.time_limit.unwrap_or_default(),
-                outcome.samples,
+                outcome.total,
                 plan.samples.total
             )),
         );
@@ -92,10 +92,19 @@ pub(super) fn metadata(scene: &Scene, plan: &Plan, camera: &Camera, outcome: &Ou
         set("abbe:complete", Attribute::Int(0));
     }
     for layer in &plan.layers {
-        set(&format!("abbe:unit:{}", layer.name), text(layer.aov.unit));
-        if layer.name != layer.aov.name {
-            set(&format!("abbe:aov:{}", layer.name), text(layer.aov.name));
+        // Bare channels go by the AOV's name.
+        let title = if layer.name.is_empty() { layer.aov.name } else { &layer.name };
+        set(&format!("abbe:unit:{title}"), text(layer.aov.unit));
+        if title != layer.aov.name {
+            set(&format!("abbe:aov:{title}"), text(layer.aov.name));
         }
+    }
+    if plan.layers.iter().any(|layer| layer.name == spectral::EMISSION && layer.aov.name == SPECTRAL) {
+        set("spectralLayoutVersion", text("1.0"));
+        set("emissiveUnits", text("radiance per nm, of which D65 with Y = 1 is white"));
+    }
+    for layer in plan.layers.iter().filter(|layer| !layer.argument.is_empty()) {
+        set(&format!("abbe:argument:{}", layer.name), text(&layer.argument));
     }
     let has_ids =
         |what: &str| plan.layers.iter().any(|layer| layer.aov.merge == Merge::First && layer.aov.name.contains(what));

@@ -23,6 +23,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 pub use layers::PlannedLayer;
+use metadata::Outcome;
 use passes::{Passed, Passes, Tally};
 pub use plan::{Plan, plan};
 pub use request::Request;
@@ -59,9 +60,9 @@ pub struct Control<'a> {
     pub cancel: &'a AtomicBool,
     /// Called after every tile, from any thread.
     pub progress: &'a (dyn Fn(Progress) + Sync),
-    /// Called with the film of the first 1, 2, 4, 8 … samples of each pixel, and of all of them; `false` ends the render there. Without it
-    /// (and without a time limit) all samples are rendered in one go.
-    pub pass: Option<&'a (dyn Fn(&Film) -> bool + Sync)>,
+    /// Called on the rendering thread with the film of the first 1, 2, 4, 8 … samples of each pixel, and of all of them, and its
+    /// header; `false` ends the render there. Without it (and without a time limit) all samples are rendered in one go.
+    pub pass: Option<&'a (dyn Fn(Film, Metadata) -> bool + Sync)>,
 }
 
 impl Control<'static> {
@@ -185,9 +186,13 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
     let prepare_seconds = begin.elapsed().as_secs_f64();
 
     let begin = Instant::now();
-    let passes = Passes { scene, plan, prepared: &*prepared, control, began: begin };
-    let Passed { tally: Tally { counters, non_finite, clamped, samples }, pixels, complete, passes, reached_limit } =
-        passes.run(&mut film);
+    let describe = |film: &Film, tally: &Tally, complete: bool, reached_limit: bool| {
+        let total = film.samples.total;
+        metadata::metadata(scene, plan, &camera, &Outcome { complete, total, reached_limit, clamped: tally.clamped })
+    };
+    let passes = Passes { scene, plan, prepared: &*prepared, control, began: begin, describe: &describe };
+    let Passed { tally, pixels, complete, passes, reached_limit } = passes.run(&mut film);
+    let Tally { counters, non_finite, clamped, samples } = tally;
     let trace_seconds = begin.elapsed().as_secs_f64();
 
     let mut warnings = scene.diagnostics().clone();
@@ -246,8 +251,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
             format!("{clamped} of {samples} samples were brighter than --clamp and were scaled down: light is missing"),
         );
     }
-    let outcome = metadata::Outcome { complete, samples: film.samples.end, reached_limit, clamped };
-    let metadata = metadata::metadata(scene, plan, &camera, &outcome);
+    let metadata = describe(&film, &tally, complete, reached_limit);
     let statistics = Statistics {
         complete,
         pixels,
@@ -293,7 +297,11 @@ fn empty_film(plan: &Plan, camera: &Camera) -> Result<Film> {
         layers: plan
             .layers
             .iter()
-            .map(|layer| Layer { half: layer.half, ..Layer::new(layer.aov, layer.name.clone(), pixels, keep_sums) })
+            .map(|layer| Layer {
+                half: layer.half,
+                argument: layer.argument.clone(),
+                ..Layer::new(layer.aov, layer.name.clone(), pixels, keep_sums)
+            })
             .collect(),
     })
 }

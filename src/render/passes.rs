@@ -15,7 +15,9 @@ use rayon::prelude::*;
 
 use super::{Control, Plan, Progress, textures};
 use crate::film::aov::{self, Aov};
+use crate::film::metadata::Metadata;
 use crate::film::pixel::PixelAccumulator;
+use crate::film::spectral::Bins;
 use crate::film::{Film, Layer, SampleRange, Values, Window};
 use crate::integrator::PreparedIntegrator;
 use crate::integrator::chain::Counters;
@@ -57,6 +59,8 @@ pub(super) struct Passes<'a> {
     pub(super) prepared: &'a dyn PreparedIntegrator,
     pub(super) control: &'a Control<'a>,
     pub(super) began: Instant,
+    /// The header of a film, of what it has come to, whether it is complete, and whether the time limit left samples out.
+    pub(super) describe: &'a (dyn Fn(&Film, &Tally, bool, bool) -> Metadata + Sync),
 }
 
 /// What is known between passes.
@@ -104,11 +108,13 @@ impl Passes<'_> {
                 }
                 passed.passes += 1;
                 begin = end;
-                if let Some(pass) = self.control.pass
-                    && !pass(&snapshot(state.film, hidden, SampleRange { end, ..samples }))
-                {
-                    passed.complete = end == samples.end;
-                    break;
+                if let Some(pass) = self.control.pass {
+                    let film = snapshot(state.film, hidden, SampleRange { end, ..samples });
+                    let metadata = (self.describe)(&film, &state.tally, true, passed.reached_limit);
+                    if !pass(film, metadata) {
+                        passed.complete = end == samples.end;
+                        break;
+                    }
                 }
                 if !state.finished.is_empty() && state.finished.iter().all(|&finished| finished) {
                     break;
@@ -149,6 +155,7 @@ impl Passes<'_> {
         let plan = self.plan;
         let samples = plan.samples;
         let aovs: Vec<&'static Aov> = state.film.layers.iter().map(|layer| layer.aov).collect();
+        let bins: Vec<(usize, Bins)> = plan.bins().collect();
         let tiles = tiles(plan.window);
         let pixels = AtomicU64::new(0);
         let total = plan.window.area() as u64;
@@ -157,7 +164,8 @@ impl Passes<'_> {
         let shared = Mutex::new(&mut *state);
         tiles.par_iter().for_each_init(
             || {
-                let pixel = PixelAccumulator::new(aovs.iter().copied(), samples.begin).clamped_to(plan.clamp);
+                let pixel = PixelAccumulator::new(aovs.iter().copied(), samples.begin);
+                let pixel = pixel.clamped_to(plan.clamp).with_bins(bins.clone());
                 (self.prepared.worker(), pixel, Tally::default())
             },
             |(worker, pixel, counted), &tile| {
@@ -247,7 +255,10 @@ fn snapshot(film: &Film, hidden: bool, samples: SampleRange) -> Film {
         sums: if samples.is_all() { None } else { layer.sums.clone() },
         ..Layer::new(layer.aov, layer.name.clone(), 0, false)
     });
-    let layers = layers.zip(&film.layers).map(|(shown, layer)| Layer { half: layer.half, ..shown }).collect();
+    let layers = layers
+        .zip(&film.layers)
+        .map(|(shown, layer)| Layer { half: layer.half, argument: layer.argument.clone(), ..shown })
+        .collect();
     Film { samples, layers, ..*film }
 }
 

@@ -18,8 +18,9 @@ use super::validity;
 use crate::camera::ConformPolicy;
 use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
-use crate::film::aov::{Aov, INTERNAL_TRANSMITTANCE};
+use crate::film::aov::{Aov, INTERNAL_TRANSMITTANCE, SPECTRAL};
 use crate::film::metadata::Attribute;
+use crate::film::spectral::Bins;
 use crate::film::{SampleRange, Window};
 use crate::geometry::Shape;
 use crate::integrator::path::DepthLimits;
@@ -247,6 +248,14 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         materials,
         diagnostics,
     })
+}
+
+impl Plan {
+    /// The layers of spectral bins: their indices and what the bins are.
+    pub fn bins(&self) -> impl Iterator<Item = (usize, Bins)> {
+        let spectral = self.layers.iter().enumerate().filter(|(_, layer)| layer.aov.name == SPECTRAL);
+        spectral.filter_map(|(index, layer)| Some((index, Bins::parse(&layer.argument).ok()?)))
+    }
 }
 
 /// Under `--strict` the first warning is an error, which says how many there are.

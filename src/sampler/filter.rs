@@ -156,13 +156,15 @@ mod tests {
                     assert!(x.abs() <= 0.5 * width && (x + y).abs() < 1e-9, "{shape:?} {x} {y}");
                     let (at, weight) = (width * (t - 0.5), shape.at(2.0 * t - 1.0));
                     total += weight;
-                    for k in 0..5 {
-                        found[k] += moments(x)[k] / f64::from(count);
-                        wanted[k] += weight * moments(at)[k];
+                    for (found, moment) in found.iter_mut().zip(moments(x)) {
+                        *found += moment / f64::from(count);
+                    }
+                    for (wanted, moment) in wanted.iter_mut().zip(moments(at)) {
+                        *wanted += weight * moment;
                     }
                 }
-                for k in 0..5 {
-                    assert!((found[k] - wanted[k] / total).abs() < 1e-5 * width, "{shape:?} {width}: {k}");
+                for (found, wanted) in found.into_iter().zip(wanted) {
+                    assert!((found - wanted / total).abs() < 1e-5 * width, "{shape:?} {width}: {found}");
                 }
             }
         }

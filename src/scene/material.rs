@@ -33,7 +33,7 @@ use network::Networks;
 use painter::Painter;
 pub(in crate::scene) use resources::{Resources, source};
 pub use shading_frame::ShadingFrame;
-use surface::IndexOf;
+use surface::{IndexOf, Measured};
 pub use surface::{Surface, SurfaceAt};
 use values::Values;
 
@@ -188,7 +188,7 @@ pub(super) fn compile(
         networks = Networks::compile(surface.shader(), &material.nodes, resources)?;
         surface.look_up(|name| networks.register(name).is_some());
     }
-    let (kind, metal, chosen) = classify(material, &terminals, surface.as_ref(), context, diagnostics)?;
+    let Classified { kind, measured, chosen } = classify(material, &terminals, surface.as_ref(), context, diagnostics)?;
     let (appearance, surface) = match &surface {
         Some(surface) => {
             let is_glass = matches!(kind, Kind::Dielectric { .. });
@@ -200,7 +200,8 @@ pub(super) fn compile(
                 Kind::Dielectric { dispersion, .. } => IndexOf::Wall(dispersion),
                 _ => IndexOf::Shader,
             };
-            let compiled = surface.layers(&mut painter).and_then(|l| Surface::compile(&l, metal, index, &mut painter));
+            let compiled =
+                surface.layers(&mut painter).and_then(|l| Surface::compile(&l, measured, index, &mut painter));
             let compiled = compiled.unwrap_or_else(|TooLarge| {
                 painter.warn("", "the networks of its surface are too large");
                 Surface::unstated()
@@ -229,14 +230,21 @@ fn compile_alone(
     compile(material, context, &mut Resources::new(&description), diagnostics)
 }
 
-/// The kind, the metal where one is stated, rough or not, and why.
+/// What a material is.
+struct Classified {
+    kind: Kind,
+    measured: Measured,
+    /// Why.
+    chosen: String,
+}
+
 fn classify(
     material: &description::Material,
     terminals: &[&Shader],
     surface: Option<&Terminal<'_>>,
     context: &Context,
     diagnostics: &mut Diagnostics,
-) -> Result<(Kind, Option<Conductor>, String)> {
+) -> Result<Classified> {
     let mut places = vec![Values::new(&material.abbe, &material.path, "")];
     if let Some(shader) = surface.map(Terminal::shader).or(material.surface.as_ref()) {
         places.push(Values::new(&shader.abbe, &shader.path, "inputs:"));
@@ -251,10 +259,11 @@ fn classify(
             _ => warn_of_unknown(terminals, diagnostics),
         };
         warn_of_idle_law(material, &authored, &reason, diagnostics)?;
-        return Ok((Kind::Opaque, None, format!("opaque: {reason}")));
+        let chosen = format!("opaque: {reason}");
+        return Ok(Classified { kind: Kind::Opaque, measured: Measured::default(), chosen });
     };
     let response = surface.response(diagnostics)?;
-    let mut metal = None;
+    let mut measured = Measured::default();
     let uses_law = matches!(response, Response::Transmissive { .. } | Response::Metal { .. });
     let (kind, reason) = match response {
         Response::Transmissive { why, rough, thin_walled } => {
@@ -282,7 +291,7 @@ fn classify(
                 Some((conductor, source)) => (Some(conductor), format!("; n + ik from {source}")),
                 None => (None, String::new()),
             };
-            metal.clone_from(&conductor);
+            measured.conductor.clone_from(&conductor);
             match rough {
                 false => (Kind::Mirror { conductor }, format!("mirror: {why}, smooth{source}")),
                 true => (Kind::Opaque, format!("opaque: {why}, rougher than {SMOOTH_ROUGHNESS}{source}")),
@@ -294,7 +303,17 @@ fn classify(
     if !uses_law {
         warn_of_idle_law(material, &authored, &reason, diagnostics)?;
     }
-    Ok((kind, metal, format!("{reason}{}", passed_over(terminals, surface.shader()))))
+    if let Some((reflectance, place)) = authored.reflectance(diagnostics)? {
+        let is_opaque = matches!(kind, Kind::Opaque | Kind::Mirror { .. });
+        if !is_opaque || measured.conductor.is_some() {
+            let message = "has no effect: this surface is glass, a hole, or a metal whose n + ik is stated";
+            diagnostics.warn("idle-reflectance", place, message);
+        } else {
+            measured.reflectance = Some(reflectance);
+        }
+    }
+    let chosen = format!("{reason}{}", passed_over(terminals, surface.shader()));
+    Ok(Classified { kind, measured, chosen })
 }
 
 /// Says that none of the terminals leads to a shader that is understood; returns it for the plan.

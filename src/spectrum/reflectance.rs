@@ -14,6 +14,7 @@ use std::sync::LazyLock;
 
 use glam::DVec3;
 
+use super::Wavelength;
 use super::fit::{Curve, Fit, inverse_sigmoid, sigmoid, sigmoid_slope};
 use super::sampled::{SampledSpectrum, Wavelengths};
 
@@ -103,6 +104,11 @@ impl Reflectance {
             return Self::constant(rgb[0] as f32);
         }
         Self { form: Form::Sigmoid(coefficients(rgb).map(|c| c as f32)) }
+    }
+
+    /// At one wavelength.
+    pub fn at_wavelength(&self, wavelength: Wavelength) -> f32 {
+        self.at(&Wavelengths::<1> { nanometers: [wavelength.nanometers()], pdf_lambda: [1.0] })[0]
     }
 
     /// At the wavelengths of a path.
@@ -195,11 +201,10 @@ fn sigmoid_of([c0, c1, c2]: [f32; 3], u: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spectrum::{Wavelength, illuminant, sensor, visible};
+    use crate::spectrum::{illuminant, sensor, visible};
 
     fn at(reflectance: &Reflectance, nanometers: f64) -> f64 {
-        let wavelengths = Wavelengths::<1> { nanometers: [nanometers], pdf_lambda: [1.0] };
-        f64::from(reflectance.at(&wavelengths)[0])
+        reflectance.at_wavelength(Wavelength::from_nanometers(nanometers)).into()
     }
 
     /// The colour by an integration of its own, in steps of 0.2 nm.

@@ -112,13 +112,11 @@ impl Visible {
     /// Wavelengths for the hero's place `u` in 0..1.
     #[inline]
     pub fn sample<const N: usize>(&self, u: f64) -> Wavelengths<N> {
-        let (mut nanometers, mut pdf_lambda) = ([0.0; N], [0.0; N]);
-        for lane in 0..N {
+        let drawn: [(f64, f64); N] = std::array::from_fn(|lane| {
             let place = u + lane as f64 / N as f64;
-            let (nm, pdf) = self.density.inverse(if place >= 1.0 { place - 1.0 } else { place });
-            (nanometers[lane], pdf_lambda[lane]) = (nm, pdf as f32);
-        }
-        Wavelengths { nanometers, pdf_lambda }
+            self.density.inverse(if place >= 1.0 { place - 1.0 } else { place })
+        });
+        Wavelengths { nanometers: drawn.map(|(nm, _)| nm), pdf_lambda: drawn.map(|(_, pdf)| pdf as f32) }
     }
 }
 

@@ -20,6 +20,7 @@ def test_our_names_and_types_are_those_of_the_plug_in():
             declared.setdefault(prim.name, {})[name] = str(attribute.typeName)
     ours = {
         "AbbeDispersionAPI": tokens.MATERIAL_NAMES,
+        "AbbeReflectanceAPI": tokens.REFLECTANCE_NAMES,
         "AbbeLensAPI": tokens.LENS_NAMES,
         "AbbeLightAPI": tokens.LIGHT_NAMES,
         "AbbeSubdivisionAPI": tokens.MESH_NAMES,

@@ -46,6 +46,7 @@ SCHEMAS = {
             "abbe:dielectricPriority": ("int", UNIFORM, 0, None),
         },
     ),
+    "AbbeReflectanceAPI": ("Material", {"abbe:reflectance:table": ("double2[]", UNIFORM, [], None)}),
     "AbbeLensAPI": (
         "Mesh",
         {
@@ -113,7 +114,8 @@ if len(sys.argv) > 1:
 stage = Usd.Stage.CreateInMemory()
 registry = Usd.SchemaRegistry()
 found = {}
-for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeLensAPI", "Mesh"), ("AbbeLightAPI", "DomeLight"),
+for name, target in (("AbbeDispersionAPI", "Material"), ("AbbeReflectanceAPI", "Material"),
+                     ("AbbeLensAPI", "Mesh"), ("AbbeLightAPI", "DomeLight"),
                      ("AbbeSubdivisionAPI", "Mesh"),
                      ("AbbeRenderSettingsAPI", "RenderSettings"), ("AbbeRenderVarAPI", "RenderVar")):
     definition = registry.FindAppliedAPIPrimDefinition(name)

@@ -173,7 +173,34 @@ def add_request(parser: argparse.ArgumentParser) -> None:
         "--width", "--imageWidth", "-w", type=int, metavar="N", help="pixels; alone, it keeps the aspect"
     )
     group.add_argument("--height", type=int, metavar="N", help="pixels; alone, it keeps the aspect")
-    group.add_argument("--samples", type=int, metavar="N", help="samples per pixel")
+    group.add_argument(
+        "--samples", type=int, metavar="N", help="samples per pixel; the most of them with an error target"
+    )
+    group.add_argument(
+        "--error-target",
+        "--error",
+        type=float,
+        metavar="X",
+        help="relative error of a pixel, by its own samples, at which it gets no more of them",
+    )
+    group.add_argument(
+        "--time-limit",
+        type=float,
+        metavar="S",
+        help="seconds per image after which it is finished with the samples that it has",
+    )
+    group.add_argument(
+        "--pixel-filter",
+        metavar="NAME",
+        help="how light is spread over pixels: box, triangle, gaussian, blackmanHarris",
+    )
+    group.add_argument("--pixel-filter-width", type=float, metavar="W", help="its full width in pixels")
+    group.add_argument(
+        "--clamp",
+        type=float,
+        metavar="X",
+        help="the most that a sample of the beauty may have; off unless given, counted and reported",
+    )
     group.add_argument(
         "--depth-of-field",
         choices=("on", "off"),
@@ -230,6 +257,11 @@ def request(args: argparse.Namespace, from_stage: bool) -> Options:
         width=args.width,
         height=args.height,
         samples=args.samples,
+        error_target=args.error_target,
+        time_limit=args.time_limit,
+        pixel_filter=args.pixel_filter,
+        pixel_filter_width=args.pixel_filter_width,
+        clamp=args.clamp,
         depth_of_field=_switch(args.depth_of_field),
         motion_blur=_switch(args.motion_blur),
         integrator=args.integrator,

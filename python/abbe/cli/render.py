@@ -6,11 +6,12 @@ import argparse
 import json
 import math
 import os
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from .. import __version__
+from .. import __version__, tev
 from .._api import Options, Scene, counted
 from .._core import Film
 from .._files import replacing
@@ -53,7 +54,16 @@ def add(commands: Any) -> None:
     group.add_argument("--disableCameraLight", action="store_true", help="there is no such light")
     group = parser.add_argument_group("reports")
     group.add_argument("--stats", metavar="FILE.json", help="write what was counted, chosen and warned of")
-    group.add_argument("--preview", metavar="FILE.png", help="write a picture of the layers in false colour")
+    group.add_argument(
+        "--preview", metavar="FILE.png", help="write a picture of the layers, again and again while the image grows"
+    )
+    group.add_argument(
+        "--tev",
+        nargs="?",
+        const=tev.DEFAULT,
+        metavar="HOST:PORT",
+        help=f"show the image in the viewer tev; {tev.DEFAULT}",
+    )
     options.add_quiet(parser)
     parser.set_defaults(run=run)
 
@@ -89,7 +99,7 @@ def _check_output(path: str, option: str, suffix: str) -> None:
         raise AbbeError(f"{path}: the folder {folder} cannot be written to: choose another")
 
 
-def _outputs(scene: Scene, args: argparse.Namespace, time: Time, request: Options) -> list[str]:
+def _outputs(scene: Scene, args: argparse.Namespace, time_code: Time, request: Options) -> list[str]:
     """Return the file of each plan."""
     plans = scene.plans(**request)
     if args.out is not None:
@@ -97,7 +107,7 @@ def _outputs(scene: Scene, args: argparse.Namespace, time: Time, request: Option
             names = ", ".join(plan.product for plan in plans)
             raise UsageError(f"OUT {args.out}: the stage has {len(plans)} products: choose one with --product: {names}")
         stage_time = scene.document["stage"].get("time_code")
-        frame = stage_time if time is None else time
+        frame = stage_time if time_code is None else time_code
         outputs = [
             frames.name_for(args.out, frame, "OUT", plan.product.rpartition("/")[2], ordinal)
             for ordinal, plan in enumerate(plans)
@@ -113,11 +123,48 @@ def _outputs(scene: Scene, args: argparse.Namespace, time: Time, request: Option
     return outputs
 
 
-def _render_one(scene: Scene, index: int, output: str, args: argparse.Namespace, request: Options) -> Film:
+# Pictures of a growing image come at most in this time (s), and cost at most this share of the time.
+_PICTURE_EVERY = 2.0
+_PICTURE_SHARE = 0.1
+
+
+class _Watcher:
+    """Shows the films of a growing render: as a picture in a file, in a viewer."""
+
+    def __init__(self, preview: str | None, viewer: tev.Viewer | None) -> None:
+        self._preview, self._viewer = preview, viewer
+        self._next = 0.0
+
+    def __call__(self, film: Film) -> None:
+        begin = time.monotonic()
+        if begin < self._next:
+            return
+        self.show(film)
+        cost = time.monotonic() - begin
+        self._next = begin + max(_PICTURE_EVERY, cost / _PICTURE_SHARE)
+
+    def show(self, film: Film) -> None:
+        """Show it now."""
+        if self._preview is not None:
+            from ..preview import write_preview
+
+            write_preview(film, self._preview)
+        if self._viewer is not None:
+            try:
+                self._viewer.show(film)
+            except AbbeError as error:
+                # A viewer that was closed is no reason to lose a render.
+                messages.note(str(error))
+                self._viewer = None
+
+
+def _render_one(
+    scene: Scene, index: int, output: str, args: argparse.Namespace, request: Options, watcher: _Watcher | None
+) -> Film:
     """Render one plan to one file; interrupted, write what is finished and go on with the interruption."""
     reporter = None if args.quiet else Reporter(output)
     try:
-        film = scene.render_plan(index, progress=reporter, **request)
+        film = scene.render_plan(index, progress=reporter, passed=watcher, **request)
     except BaseException as interruption:
         partial: Film | None = getattr(interruption, "film", None)
         if partial is not None and partial.statistics["pixels"] > 0:
@@ -175,8 +222,8 @@ def run(args: argparse.Namespace) -> int:
     try:
         # The stage stays open between frames.
         kept = None if len(times) == 1 or options.is_scene_file(args) else options.keep_open(args)
-        for time in times:
-            _render_frame(args, time, outcome, kept)
+        for time_code in times:
+            _render_frame(args, time_code, outcome, kept)
     except (AbbeError, OSError) as error:
         # With some frames written and others not, the output is partial, whatever went wrong.
         if not outcome.files:
@@ -190,24 +237,27 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _render_frame(args: argparse.Namespace, time: Time, outcome: _Outcome, kept: Any) -> None:
-    scene = options.open_scene(args, time, kept)
+def _render_frame(args: argparse.Namespace, time_code: Time, outcome: _Outcome, kept: Any) -> None:
+    scene = options.open_scene(args, time_code, kept)
     request = options.request(args, from_stage=not options.is_scene_file(args))
-    outputs = _outputs(scene, args, time, request)
+    outputs = _outputs(scene, args, time_code, request)
     for output in outputs:
         if output in outcome.files or outputs.count(output) > 1:
             raise UsageError(f"{output}: several products or frames would write it: give them different names")
     if args.preview is not None and len(outputs) > 1:
         raise UsageError("--preview: there are several products: choose one with --product")
+    stage_time = scene.document["stage"].get("time_code")
     for index, output in enumerate(outputs):
-        film = _render_one(scene, index, output, args, request)
+        preview = None if args.preview is None else frames.name_for(args.preview, stage_time, "--preview")
+        viewer = None if args.tev is None else tev.Viewer(args.tev, output)
+        watcher = _Watcher(preview, viewer) if preview is not None or viewer is not None else None
+        film = _render_one(scene, index, output, args, request, watcher)
         outcome.files.append(output)
-        outcome.renders.append({"output": output, "frame": scene.document["stage"].get("time_code"), **film.statistics})
+        outcome.renders.append({"output": output, "frame": stage_time, **film.statistics})
         if not args.quiet:
             counts = f"{counted(len(film), 'AOV')}, {counted(_area(film), 'pixel')}"
             print(f"{output}: {counts}, {_seconds(film.statistics['trace_seconds'])}")
-        if args.preview is not None:
-            from ..preview import write_preview
-
-            preview = frames.name_for(args.preview, scene.document["stage"].get("time_code"), "--preview")
-            write_preview(film, preview)
+        if watcher is not None:
+            watcher.show(film)
+        if viewer is not None:
+            viewer.close()

@@ -131,7 +131,8 @@ class MaterialReader:
         return material, nodes.primvars
 
     def _check_names(self, path: str, names: Iterable[str], prefix: str = "") -> None:
-        warn_unknown_names(path, names, tokens.MATERIAL_NAMES, self._diagnostics, prefix=prefix)
+        known = tokens.MATERIAL_NAMES if prefix else {**tokens.MATERIAL_NAMES, **tokens.REFLECTANCE_NAMES}
+        warn_unknown_names(path, names, known, self._diagnostics, prefix=prefix)
 
     def _surfaces(self, network: Network, prim: Any) -> dict[Any, str]:
         """Return the surface shaders and the terminals they were found through, in the order of the terminals."""

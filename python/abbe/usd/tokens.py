@@ -295,6 +295,7 @@ MATERIAL_NAMES: Final = {
     "abbe:internalTransmittance:thickness": "double",
     "abbe:dielectricPriority": "int",
 }
+REFLECTANCE_NAMES: Final = {"abbe:reflectance:table": "double2[]"}
 LENS_THICKNESS: Final = "abbe:lens:thickness"
 LENS_EDGE_RADIUS: Final = "abbe:lens:edgeRadius"
 LENS_PREFIX: Final = "abbe:lens:"
@@ -350,7 +351,7 @@ LIGHT_TYPES: Final = (
     "PortalLight",
 )
 OUR_SCHEMAS: Final = {
-    "Material": MATERIAL_NAMES,
+    "Material": {**MATERIAL_NAMES, **REFLECTANCE_NAMES},
     "Mesh": {**LENS_NAMES, **MESH_NAMES, **LIGHT_NAMES},
     "Xform": LENS_NAMES,
     RENDER_SETTINGS: SETTINGS_NAMES,

@@ -140,7 +140,7 @@ def _check(reading: Reading, prim: Any, item: Any, name: str, prefix: str) -> It
 def _read_on(prim: Any, prefix: str) -> Mapping[str, str]:
     """Return the names that are read on a prim of this type, as they are or behind ``inputs:``."""
     if prim.IsA(UsdShade.Material):
-        return tokens.MATERIAL_NAMES
+        return tokens.MATERIAL_NAMES if prefix else {**tokens.MATERIAL_NAMES, **tokens.REFLECTANCE_NAMES}
     if prefix:
         # Interfaces of node graphs pass values on.
         return tokens.MATERIAL_NAMES if prim.IsA(UsdShade.Shader) or prim.IsA(UsdShade.NodeGraph) else {}

@@ -18,7 +18,12 @@ What is not given, the scene's render settings decide.
   --camera PATH            a camera of the scene
   --product PATH           the one product to render
   --width N, --height N    pixels; one alone keeps the aspect
-  --samples N              samples per pixel
+  --samples N              samples per pixel; the most of them with an error target
+  --error-target X         relative error at which a pixel gets no more samples
+  --time-limit S           seconds after which the image is finished with the samples that it has
+  --pixel-filter NAME      box, triangle, gaussian, blackmanHarris: how light is spread over pixels
+  --pixel-filter-width W   its full width, pixels
+  --clamp X                the most a sample of the beauty may have; counted and reported
   --depth-of-field on|off  spread samples over the lens, or not; as the scene says unless given
   --integrator NAME        what computes a pixel
   --aov NAME               an AOV to render, instead of the scene's; repeat for more
@@ -88,6 +93,11 @@ fn read(mut parser: lexopt::Parser) -> Result<Command> {
             "width" => request.width = Some(number(&mut parser, &option)?),
             "height" => request.height = Some(number(&mut parser, &option)?),
             "samples" => request.samples = Some(number(&mut parser, &option)?),
+            "error-target" | "error" => request.error_target = Some(number(&mut parser, &option)?),
+            "time-limit" => request.time_limit = Some(number(&mut parser, &option)?),
+            "pixel-filter" => request.pixel_filter = Some(text(&mut parser, &option)?),
+            "pixel-filter-width" => request.pixel_filter_width = Some(number(&mut parser, &option)?),
+            "clamp" => request.clamp = Some(number(&mut parser, &option)?),
             "depth-of-field" => request.depth_of_field = Some(on_or_off(&mut parser, &option)?),
             "motion-blur" => request.motion_blur = Some(on_or_off(&mut parser, &option)?),
             "integrator" => request.integrator = Some(text(&mut parser, &option)?),

@@ -65,11 +65,11 @@ impl At {
         Self { start, weights: [a * b * c / -6.0, f * b * c / 2.0, f * a * c / -2.0, f * a * b / 6.0] }
     }
 
-    /// The value there.
+    /// The value there, of what is nowhere negative.
     #[inline]
     pub(super) fn of(&self, slice: &Slice) -> f32 {
         let values = &slice[self.start..self.start + 4];
-        self.weights.iter().zip(values).map(|(w, v)| w * v).sum()
+        self.weights.iter().zip(values).map(|(w, v)| w * v).sum::<f32>().max(0.0)
     }
 
     /// The values there, lane by lane.
@@ -79,7 +79,7 @@ impl At {
         for (w, v) in self.weights.iter().zip(&slice[self.start..self.start + 4]) {
             sum += *v * *w;
         }
-        sum
+        sum.map(|value| value.max(0.0))
     }
 }
 

@@ -1,4 +1,8 @@
 //! Laws that every scattering model keeps.
 
+mod fresnel;
 mod furnace;
+mod laws;
+mod sampling;
+mod smooth;
 mod support;

@@ -20,7 +20,7 @@ use super::lanes::Laws;
 use super::light_path::Expression;
 use super::{Integrator, PreparedIntegrator, Task, Worker};
 use crate::error::{Error, Result};
-use crate::film::aov::{AOVS, Aov, COLOR, COLOR_CLEAN, Family, SAMPLE_COUNT, VARIANCE};
+use crate::film::aov::{AOVS, Aov, COLOR, COLOR_CLEAN, Family, SAMPLE_COUNT, SPECTRAL, VARIANCE};
 use crate::film::pixel::PixelAccumulator;
 use crate::lighting::Lighting;
 use crate::spectrum::{LANES, sensor, visible};
@@ -80,7 +80,7 @@ impl<'a> Prepared<'a> {
         for (layer, (aov, argument)) in task.aovs.iter().zip(task.arguments).enumerate() {
             match aov.name {
                 COLOR_CLEAN => clean_layers.push(layer),
-                COLOR | VARIANCE | SAMPLE_COUNT => {}
+                COLOR | VARIANCE | SAMPLE_COUNT | SPECTRAL => {}
                 _ if aov.family == Family::Transport => {
                     let expression = Expression::of_aov(aov.name, argument)
                         .map_err(|problem| Error::usage(format!("--aov {}:{argument}", aov.name), problem))?;
@@ -167,9 +167,11 @@ impl<const N: usize, const DISPERSIVE: bool> Worker for PathWorker<'_, N, DISPER
             };
             let alpha = self.tracer.trace(&start, wavelengths, &mut numbers.clone()).into();
             let [r, g, b] = color(self.tracer.ledger.total);
-            out.add_color([r, g, b, alpha]);
+            // A sample that is scaled down takes its parts with it.
+            let scale = out.add_color([r, g, b, alpha]);
+            out.add_spectrum(self.tracer.ledger.total, &wavelengths, scale);
             for (&layer, light) in self.prepared.parts.iter().zip(self.tracer.ledger.parts()) {
-                out.add(layer, Some(color(light)));
+                out.add(layer, Some(color(light).map(|channel| scale * channel)));
             }
             if let Some(clean) = &mut self.clean {
                 let alpha = clean.trace(&start, wavelengths, &mut numbers.clone()).into();

@@ -9,10 +9,11 @@ mod compile;
 mod tests;
 
 use crate::diagnostics::Diagnostics;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::optics::catalog;
 use crate::optics::dispersion::Dispersion;
 use crate::optics::media::Priority;
+use crate::optics::reflectance::MeasuredReflectance;
 
 use super::values::Values;
 
@@ -34,6 +35,8 @@ const EXTINCTION: &str = "abbe:extinction:table";
 const TRANSMITTANCE: &str = "abbe:internalTransmittance:table";
 const THICKNESS: &str = "abbe:internalTransmittance:thickness";
 const SCALE: &str = "abbe:dispersion:scale";
+/// Of AbbeReflectanceAPI.
+const REFLECTANCE: &str = "abbe:reflectance:table";
 const PRIORITY: &str = "abbe:dielectricPriority";
 
 /// Everything that AbbeDispersionAPI declares.
@@ -200,7 +203,9 @@ impl<'a> Authored<'a> {
     /// Names every attribute that is none of ours.
     pub(super) fn warn_of_unread(&self, diagnostics: &mut Diagnostics) {
         for values in &self.places {
-            for name in values.names().filter(|name| !ATTRIBUTES.contains(name)) {
+            // A reflectance is the material's own.
+            let is_read = |name: &str| ATTRIBUTES.contains(&name) || (name == REFLECTANCE && values.is_own());
+            for name in values.names().filter(|name| !is_read(name)) {
                 diagnostics.warn(
                     "unread-attribute",
                     values.place(name),
@@ -227,6 +232,15 @@ impl<'a> Authored<'a> {
     pub(super) fn scale_place(&self) -> String {
         let place = self.places.iter().find(|values| values.has(SCALE)).or(self.places.first());
         place.map_or_else(String::new, |values| values.place(SCALE))
+    }
+
+    /// The measured reflectance of the material, and where it stands.
+    pub(super) fn reflectance(&self, diagnostics: &mut Diagnostics) -> Result<Option<(MeasuredReflectance, String)>> {
+        let Some(values) = self.places.iter().find(|values| values.is_own()) else { return Ok(None) };
+        let Some(entries) = values.pairs(REFLECTANCE, diagnostics)? else { return Ok(None) };
+        let place = values.place(REFLECTANCE);
+        let measured = MeasuredReflectance::table(&entries).map_err(|problem| Error::scene(&place, problem))?;
+        Ok(Some((measured, place)))
     }
 
     /// The dielectric priority and where it stands; `None` where none is set (0 is unset).

@@ -6,6 +6,7 @@
 use crate::bsdf::{Coat, Film, Interface, Metal, Parameters, Sheen};
 use crate::diagnostics::Diagnostics;
 use crate::optics::Dispersion;
+use crate::optics::reflectance::MeasuredReflectance;
 use crate::scene::description::Shader;
 use crate::spectrum::reflectance::Reflectance;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
@@ -209,6 +210,13 @@ fn within(x: f32, low: f32, high: f32) -> f32 {
     x.max(low).min(high)
 }
 
+/// What the colours of a surface refer to.
+#[derive(Clone, Copy)]
+struct Found<'a> {
+    results: &'a Results,
+    reflectance: Option<&'a MeasuredReflectance>,
+}
+
 /// A colour of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Tint {
@@ -216,6 +224,8 @@ enum Tint {
     White,
     Reflectance(Reflectance),
     LookedUp(usize),
+    /// The surface's measured reflectance.
+    Measured,
 }
 
 impl Tint {
@@ -231,15 +241,18 @@ impl Tint {
         }
     }
 
-    fn at<const N: usize>(&self, results: &Results, wavelengths: &Wavelengths<N>) -> SampledSpectrum<N> {
+    fn at<const N: usize>(&self, found: Found<'_>, wavelengths: &Wavelengths<N>) -> SampledSpectrum<N> {
         match self {
             Self::Black => SampledSpectrum::ZERO,
             Self::White => SampledSpectrum::ONE,
             Self::Reflectance(reflectance) => reflectance.at(wavelengths),
             Self::LookedUp(i) => {
-                let [r, g, b, _] = results[*i];
+                let [r, g, b, _] = found.results[*i];
                 Reflectance::of_color([r, g, b]).at(wavelengths)
             }
+            Self::Measured => SampledSpectrum::from_fn(|lane| {
+                found.reflectance.map_or(0.0, |measured| measured.at(wavelengths.lane(lane)) as f32)
+            }),
         }
     }
 }
@@ -269,6 +282,15 @@ enum Index {
     Own(Number),
 }
 
+/// What is known of a surface by measurement.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Measured {
+    /// n + ik of its metal.
+    pub(super) conductor: Option<Conductor>,
+    /// The base colour, its weight included.
+    pub(super) reflectance: Option<MeasuredReflectance>,
+}
+
 /// Where the index of a dielectric comes from.
 pub(super) enum IndexOf<'a> {
     /// The media that meet.
@@ -284,6 +306,7 @@ pub(super) enum IndexOf<'a> {
 pub struct Surface {
     /// Everything that differs from point to point; `None` where nothing does.
     looked_up: Option<Bundle>,
+    reflectance: Option<MeasuredReflectance>,
     base_color: Tint,
     diffuse_roughness: Number,
     metalness: Number,
@@ -398,14 +421,15 @@ impl Surface {
         let mut diagnostics = Diagnostics::default();
         let mut painter = Painter::new(&shader, networks, &mut diagnostics);
         let layers = Layers::diffuse(color, &mut painter);
-        let compiled = layers.and_then(|layers| Self::compile(&layers, None, IndexOf::Shader, &mut painter));
+        let compiled =
+            layers.and_then(|layers| Self::compile(&layers, Measured::default(), IndexOf::Shader, &mut painter));
         compiled.expect("a handful of operations is not too many")
     }
 
     /// Compiles what a dialect states. A metal whose n + ik is known is that, and `index` says whose index counts.
     pub(super) fn compile(
         layers: &Layers,
-        conductor: Option<Conductor>,
+        measured: Measured,
         index: IndexOf<'_>,
         p: &mut Painter<'_, '_, '_>,
     ) -> Painted<Self> {
@@ -416,14 +440,16 @@ impl Surface {
         };
         let mut c = Compiler { p, results: Vec::new() };
         let metalness = c.share(layers.metalness);
+        let Measured { conductor, reflectance } = measured;
+        let base = |color: Tint| if reflectance.is_some() { Tint::Measured } else { color };
         let metal = match (conductor, layers.metal) {
             (Some(conductor), _) => SurfaceMetal::Index(Box::new(conductor)),
             // Nobody asks of a metal that is not there.
             (None, _) if metalness.is_zero() => SurfaceMetal::Flat(Tint::White),
-            (None, MetalLayer::Tint { f0, f82 }) => SurfaceMetal::Tint { f0: c.tint(f0), f82: c.tint(f82) },
-            (None, MetalLayer::Flat(f0)) => SurfaceMetal::Flat(c.tint(f0)),
+            (None, MetalLayer::Tint { f0, f82 }) => SurfaceMetal::Tint { f0: base(c.tint(f0)), f82: c.tint(f82) },
+            (None, MetalLayer::Flat(f0)) => SurfaceMetal::Flat(base(c.tint(f0))),
             (None, MetalLayer::Artistic { reflectivity, edge }) => {
-                SurfaceMetal::Artistic { reflectivity: c.tint(reflectivity), edge: c.tint(edge) }
+                SurfaceMetal::Artistic { reflectivity: base(c.tint(reflectivity)), edge: c.tint(edge) }
             }
         };
         let coat = layers.coat.map(|coat| SurfaceCoat {
@@ -459,7 +485,8 @@ impl Surface {
         };
         let surface = Self {
             looked_up: None,
-            base_color: c.tint(layers.base_color),
+            reflectance: None,
+            base_color: base(c.tint(layers.base_color)),
             diffuse_roughness: c.share(layers.diffuse_roughness),
             metalness,
             metal,
@@ -482,7 +509,7 @@ impl Surface {
         };
         let Compiler { p, results } = c;
         let looked_up = if results.is_empty() { None } else { Some(p.b().bundle(&results)?) };
-        Ok(Self { looked_up, ..surface })
+        Ok(Self { looked_up, reflectance, ..surface })
     }
 
     /// The programs that light transport runs at every hit; `None` where everything is constant.
@@ -529,14 +556,15 @@ impl Surface {
         wavelengths: &Wavelengths<N>,
         interface: Interface<N>,
     ) -> SurfaceAt<N> {
-        let tint = |tint: &Tint| tint.at(results, wavelengths);
+        let found = Found { results, reflectance: self.reflectance.as_ref() };
+        let tint = |tint: &Tint| tint.at(found, wavelengths);
         let pair = |pair: &[Number; 2]| pair.map(|number| number.at(results));
         let presence = self.presence.at(results);
         let parameters = Parameters {
             base_color: tint(&self.base_color),
             diffuse_roughness: self.diffuse_roughness.at(results),
             metalness: self.metalness.at(results),
-            metal: self.metal(results, wavelengths),
+            metal: self.metal(found, wavelengths),
             specular_weight: self.specular_weight.at(results),
             specular_color: tint(&self.specular_color),
             alpha: pair(&self.alpha),
@@ -594,18 +622,18 @@ impl Surface {
         }
     }
 
-    fn metal<const N: usize>(&self, results: &Results, wavelengths: &Wavelengths<N>) -> Metal<N> {
+    fn metal<const N: usize>(&self, found: Found<'_>, wavelengths: &Wavelengths<N>) -> Metal<N> {
         match &self.metal {
             SurfaceMetal::Tint { f0, f82 } => {
-                Metal::Tint { f0: f0.at(results, wavelengths), f82: f82.at(results, wavelengths) }
+                Metal::Tint { f0: f0.at(found, wavelengths), f82: f82.at(found, wavelengths) }
             }
             SurfaceMetal::Flat(f0) => {
-                let f0 = f0.at(results, wavelengths);
+                let f0 = f0.at(found, wavelengths);
                 Metal::Tint { f0, f82: f0.map(flat_tint) }
             }
             SurfaceMetal::Artistic { reflectivity, edge } => {
-                let reflectivity = reflectivity.at(results, wavelengths);
-                let edge = edge.at(results, wavelengths);
+                let reflectivity = reflectivity.at(found, wavelengths);
+                let edge = edge.at(found, wavelengths);
                 Metal::Index {
                     n: reflectivity.zip(edge, |r, g| artistic(r, g)[0]),
                     k: reflectivity.zip(edge, |r, g| artistic(r, g)[1]),

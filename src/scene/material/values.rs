@@ -19,6 +19,11 @@ impl<'a> Values<'a> {
         Self { map, path, prefix }
     }
 
+    /// Whether these are the prim's own attributes, no inputs.
+    pub(super) fn is_own(&self) -> bool {
+        self.prefix.is_empty()
+    }
+
     /// `</World/Glass>.inputs:ior`
     pub(super) fn place(&self, name: &str) -> String {
         format!("<{}>.{}{name}", self.path, self.prefix)

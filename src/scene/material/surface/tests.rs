@@ -330,6 +330,39 @@ fn metals_with_an_index_have_it_at_every_wavelength_rough_or_smooth() {
 }
 
 #[test]
+fn a_measured_reflectance_is_the_base_colour_at_every_wavelength() {
+    let table = |material: &mut description::Material, entries: Value| {
+        let authored = description::Authored { type_name: "double2[]".to_owned(), value: entries };
+        material.abbe.insert("abbe:reflectance:table".to_owned(), authored);
+    };
+    for (id, metal) in [("UsdPreviewSurface", "metallic"), (STANDARD, "metalness"), (OPEN_PBR, "base_metalness")] {
+        for metalness in [0.0, 1.0] {
+            let mut measured = document(id, &json!({metal: metalness}));
+            table(&mut measured, json!([[360.0, 0.2], [830.0, 0.6]]));
+            let (measured, diagnostics) = compiled(&measured);
+            assert!(diagnostics.is_empty(), "{:?}", diagnostics.warnings());
+            let parameters = constant(&measured).parameters;
+            for lane in 0..4 {
+                let expected = (0.2 + 0.4 * (wavelengths().nanometers()[lane] - 360.0) / 470.0) as f32;
+                close(parameters.base_color[lane], expected);
+                match parameters.metal {
+                    _ if metalness == 0.0 => {}
+                    Metal::Tint { f0, .. } => close(f0[lane], expected),
+                    Metal::Index { n, k } => close(metallic_f0(n[lane], k[lane]), expected),
+                }
+            }
+        }
+    }
+    let mut glass = document(OPEN_PBR, &json!({"transmission_weight": 1.0}));
+    table(&mut glass, json!([[360.0, 0.2], [830.0, 0.6]]));
+    assert_eq!(compiled(&glass).1.warnings()[0].kind, "idle-reflectance");
+    let mut wrong = document(OPEN_PBR, &json!({}));
+    table(&mut wrong, json!([[360.0, 20.0], [830.0, 60.0]]));
+    let error = compile_alone(&wrong, &CONTEXT, &mut Diagnostics::default()).expect_err("is refused").to_string();
+    assert!(error.starts_with("</M>.abbe:reflectance:table") && error.contains("divide per cents by 100"), "{error}");
+}
+
+#[test]
 fn chain_and_paths_agree_on_what_is_smooth() {
     for (roughness, is_smooth) in [(0.0, true), (SMOOTH_ROUGHNESS, true), (0.0301, false), (0.3, false)] {
         let inputs = json!({"transmission_weight": 1.0, "specular_roughness": roughness});
