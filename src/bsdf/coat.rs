@@ -22,7 +22,8 @@ pub(super) struct CoatLobe<const N: usize> {
 impl<const N: usize> CoatLobe<N> {
     pub(super) fn new(coat: &Coat<N>, interface: &Interface<N>) -> Self {
         let weight = coat.weight.clamp(0.0, 1.0);
-        let eta = (coat.ior / interface.ior_i.hero()).max(1.0);
+        // As the base: no total reflection where the coat is the rarer medium.
+        let eta = (coat.ior / interface.ior_i.hero()).max(interface.ior_i.hero() / coat.ior);
         let colored = coat.color.0.iter().any(|&c| c < 1.0);
         Self {
             gloss: Gloss::new(weight, Fresnel::uniform(eta), coat.alpha, SampledSpectrum::ONE),

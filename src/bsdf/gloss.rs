@@ -37,7 +37,7 @@ fn rough_albedo<const N: usize>(fresnel: &Fresnel<N>, roughness: Roughness) -> S
             let (rise, white) = (roughness.rise(), roughness.white());
             std::array::from_fn(|i| f0.map(|f0| f0 * (white[i] - rise[i]) + rise[i]))
         }
-        _ => roughness.facing_of_spectra(&std::array::from_fn(|i| fresnel.at(albedo::node(i)))),
+        _ => roughness.facing(&std::array::from_fn(|i| fresnel.at(albedo::node(i)))),
     }
 }
 

@@ -102,7 +102,9 @@ impl<const N: usize> Stack<N> {
         if share > 0.0 {
             let fresnel = match parameters.schlick_f0 {
                 Some(f0) => Fresnel::of_schlick(f0, parameters.specular_weight),
-                None => Fresnel::of_dielectric(parameters, eta),
+                // Seen from the denser side an opaque base would reflect totally from an angle on that depends on wavelength; as in
+                // OpenPBR 1.1 it reflects as from the rarer side, which is the same at normal incidence.
+                None => Fresnel::of_dielectric(parameters, eta.map(|eta| eta.max(1.0 / eta))),
             };
             // Without an interface of the base, what passes the layers above reaches the base.
             let bare = parameters.specular_weight <= 0.0

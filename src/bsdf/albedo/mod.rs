@@ -144,11 +144,8 @@ impl Roughness {
         slice
     }
 
-    /// Albedo of a single reflection by a dielectric of the index ratio η.
+    /// Albedo of a single reflection by a dielectric of the index ratio η ≥ 1.
     pub(super) fn dielectric(&self, eta_ti: f32) -> Slice {
-        if eta_ti < 1.0 {
-            return self.facing(&std::array::from_fn(|i| super::fresnel::dielectric(node(i), eta_ti)));
-        }
         self.of_ratio(&tables().dielectric, eta_ti)
     }
 
@@ -158,12 +155,7 @@ impl Roughness {
     }
 
     /// Albedo of a single reflection where facets reflect `reflectance`, given at the nodes.
-    pub(super) fn facing(&self, reflectance: &Slice) -> Slice {
-        self.apply(&tables().facing, reflectance)
-    }
-
-    /// [`Self::facing`], lane by lane.
-    pub(super) fn facing_of_spectra<const N: usize>(
+    pub(super) fn facing<const N: usize>(
         &self,
         reflectance: &[SampledSpectrum<N>; NODES],
     ) -> [SampledSpectrum<N>; NODES] {
@@ -180,14 +172,10 @@ impl Roughness {
 
     /// What of a single, complete reflection passes a layer of this transmittance on its way back.
     pub(super) fn leaving(&self, transmittance: &Slice) -> Slice {
-        self.apply(&tables().leaving, transmittance)
-    }
-
-    fn apply(&self, matrices: &[Matrix; ROUGHNESSES], function: &Slice) -> Slice {
         let mut slice = [0.0; NODES];
         for (k, w) in self.0.weights.iter().enumerate() {
-            for (s, row) in slice.iter_mut().zip(&matrices[self.0.start + k]) {
-                *s += w * row.iter().zip(function).map(|(v, f)| v * f).sum::<f32>();
+            for (s, row) in slice.iter_mut().zip(&tables().leaving[self.0.start + k]) {
+                *s += w * row.iter().zip(transmittance).map(|(v, t)| v * t).sum::<f32>();
             }
         }
         slice

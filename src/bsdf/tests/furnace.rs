@@ -69,6 +69,9 @@ fn white_diffuse_surfaces() {
     for alpha in [0.0, 0.2] {
         assert_lossless("film", &Parameters { film, ..Parameters::plastic(ONE, interface(1.0, 1.5), alpha) });
     }
+    for (i, t) in [(1.33, 1.3), (1.5, 1.0)] {
+        assert_lossless("from the denser side", &Parameters::plastic(ONE, interface(i, t), 0.1));
+    }
     let schlick = Parameters { schlick_f0: Some(ONE * 0.3), ..Parameters::plastic(ONE, interface(1.0, 1.5), 0.3) };
     assert_lossless("Schlick", &schlick);
 }
