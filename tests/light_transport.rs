@@ -7,11 +7,10 @@ mod support;
 use std::f64::consts::PI;
 
 use abbe::film::{Film, Values};
-use abbe::integrator::path::DepthLimits;
 use abbe::render::Request;
 use abbe::scene::Scene;
 use abbe::scene::description::{Authored, Light, LightShape, LightShaping};
-use glam::{DMat4, DQuat, DVec3};
+use glam::{DMat4, DVec3};
 use serde_json::json;
 use support::{BK7, SF11, Stagehand, authored, rendered, request};
 
@@ -533,14 +532,12 @@ fn nothing_but_the_scene_decides_a_bit() {
 #[test]
 fn depth_limits_cut_what_they_name() {
     let scene = still_life(|s| lambert(s, 0.7), soft_lights()).build();
-    let rendered_with = |limits| {
-        let request = Request { depth_limits: limits, ..color_request(8, 4, 64, "path") };
-        mean(&rendered(&scene, &request).film).0[1]
-    };
-    let all = rendered_with(DepthLimits::default());
-    let direct = rendered_with(DepthLimits { total: Some(1), ..DepthLimits::default() });
-    let emitted = rendered_with(DepthLimits { total: Some(0), ..DepthLimits::default() });
-    let no_diffuse = rendered_with(DepthLimits { diffuse: Some(0), ..DepthLimits::default() });
+    let rendered_with = |limits: Request| mean(&rendered(&scene, &limits).film).0[1];
+    let request = color_request(8, 4, 64, "path");
+    let all = rendered_with(request.clone());
+    let direct = rendered_with(Request { max_depth: Some(1), ..request.clone() });
+    let emitted = rendered_with(Request { max_depth: Some(0), ..request.clone() });
+    let no_diffuse = rendered_with(Request { max_diffuse_depth: Some(0), ..request });
     assert!(emitted < direct && direct < all, "{emitted} {direct} {all}");
     assert_eq!(emitted, no_diffuse, "everything here is diffuse");
 }
@@ -555,5 +552,4 @@ fn matte_objects_leave_a_hole() {
     assert_eq!(middle, [0.0; 4]);
     let corner = &values(&film, "color")[..4];
     assert_eq!(corner[3], 1.0);
-    let _ = DQuat::IDENTITY;
 }
