@@ -24,6 +24,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::camera::Camera;
+use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::SampleRange;
 use crate::film::aov::{Aov, Family, INTERNAL_TRANSMITTANCE, is_albedo};
@@ -169,6 +170,11 @@ pub trait Integrator: Send + Sync {
 pub trait PreparedIntegrator: Send + Sync {
     /// A worker for one thread.
     fn worker(&self) -> Box<dyn Worker + '_>;
+
+    /// What was odd about what it has read while it was made ready.
+    fn diagnostics(&self) -> Diagnostics {
+        Diagnostics::default()
+    }
 }
 
 /// Renders pixels on one thread. What it writes depends on the pixel and its sample indices alone.

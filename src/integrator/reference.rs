@@ -15,6 +15,7 @@ use super::lanes::{Laws, PathMedia};
 use super::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
 use super::{Integrator, PreparedIntegrator, Task, Worker, surface};
 use crate::bsdf::{Bsdf, Interface, Scattered};
+use crate::diagnostics::Diagnostics;
 use crate::error::Result;
 use crate::film::aov::{AOVS, Aov, COLOR, SAMPLE_COUNT, SPECTRAL, VARIANCE};
 use crate::film::pixel::PixelAccumulator;
@@ -74,6 +75,10 @@ impl PreparedIntegrator for Prepared<'_> {
             counters: Counters::default(),
         })
     }
+
+    fn diagnostics(&self) -> Diagnostics {
+        self.lighting.diagnostics().clone()
+    }
 }
 
 struct BruteForce<'a> {
@@ -111,18 +116,27 @@ impl<'a> BruteForce<'a> {
     fn follow(&mut self, walk: &mut Walk<'a>, wavelengths: &Wavelengths<1>, numbers: &mut PathSampler) -> (f32, f64) {
         let Prepared { task, lighting, .. } = self.prepared;
         let (mut radiance, mut throughput, mut vertices) = (0.0, 1.0, 0);
+        // The object of the last event, which only its own lights reach.
+        let mut object = None;
         loop {
             let met = walk.advance(&mut self.counters);
             let ray = walk.ray;
             let medium = self.media.of(walk.media.current());
             let through = |distance: f64| medium.transmittance(distance).map_or(1.0, |t| t.hero());
             let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
+            let is_linked = |light| object.is_none_or(|object| lighting.is_linked(light, object));
             lighting.along(&ray, limit, wavelengths, &mut |light| {
+                if !is_linked(light.light) {
+                    return;
+                }
                 radiance += throughput * through(light.distance) * light.radiance.hero();
             });
             let alpha = f64::from(u8::from(vertices > 0));
             let Some(met) = met else {
                 lighting.environment(&ray, wavelengths, &mut |light| {
+                    if !is_linked(light.light) {
+                        return;
+                    }
                     radiance += throughput * through(f64::INFINITY) * light.radiance.hero();
                 });
                 return (radiance, alpha);
@@ -147,9 +161,13 @@ impl<'a> BruteForce<'a> {
                 continue;
             }
             vertices += 1;
-            if let Some(light) = lighting.emitted(&ray, &met.hit, wavelengths) {
+            if let Some(light) = lighting.emitted(&ray, &met.hit, wavelengths).filter(|light| is_linked(light.light)) {
                 radiance += throughput * light.radiance.hero();
             }
+            if lighting.replaces_material(&met.hit) {
+                return (radiance, 1.0);
+            }
+            object = Some(met.hit.instance);
             let facing = |n: DVec3| if ray.direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
             let n_g = facing(met.surface.n_g);
             let n_s = Some(facing(at.normal)).filter(|n| ray.direction.dot(*n) < 0.0).unwrap_or(n_g);

@@ -98,6 +98,8 @@ pub struct LightHit<const N: usize> {
     pub radiance: SampledSpectrum<N>,
     /// What [`Lighting::pdf`] is asked about.
     pub emitter: EmitterId,
+    /// Where; the start of a ray may have moved on since the receiver.
+    point: DVec3,
 }
 
 /// What a number of an emitter stands for.
@@ -376,7 +378,7 @@ impl<'a> Lighting<'a> {
     }
 
     /// The density with which [`sample`](Self::sample) draws, for the receiver, the direction `wi` of a ray from there that met
-    /// `hit`; 0 of what is never sampled for it.
+    /// `hit`, straight on through whatever; 0 of what is never sampled for it.
     pub fn pdf<const N: usize>(&self, receiver: &Receiver, wi: DVec3, hit: &LightHit<N>) -> f32 {
         let EmitterId(number) = hit.emitter;
         if hit.emitter == EmitterId::NONE {
@@ -388,11 +390,11 @@ impl<'a> Lighting<'a> {
         if probability <= 0.0 {
             return 0.0;
         }
-        let (p, distance) = (receiver.point, hit.distance);
+        let (p, distance) = (receiver.point, (hit.point - receiver.point).length());
         let pdf_solid_angle = match self.emitters[number as usize] {
             Emitter::Piece { object, primitive } => match self.objects.get(object).piece(self.view, primitive) {
                 Some(Piece::Triangle(triangle)) => triangle.pdf(p, wi, distance),
-                Some(Piece::Sphere(ball)) => ball.pdf(p, wi),
+                Some(Piece::Sphere(ball)) => ball.pdf(p, wi, distance),
                 Some(Piece::Face(face)) => face.pdf(p, distance),
                 Some(Piece::Ring(ring)) => ring.pdf(p, wi, distance),
                 None => 0.0,
@@ -400,7 +402,7 @@ impl<'a> Lighting<'a> {
             Emitter::Light => match self.placed[number as usize].as_ref().map(|placed| &placed.form) {
                 Some(Form::Rectangle { shape, .. }) => shape.pdf(p, distance),
                 Some(Form::Disk(disk)) => disk.pdf(p, distance),
-                Some(Form::Ellipsoid(ball)) => ball.pdf(p, wi),
+                Some(Form::Ellipsoid(ball)) => ball.pdf(p, wi, distance),
                 Some(Form::Tube(tube)) => tube.pdf(p, wi),
                 Some(Form::Distant(sky)) => sky.pdf(),
                 Some(Form::Dome(dome)) => dome.pdf(p, chooser.normal, wi),
@@ -424,7 +426,8 @@ impl<'a> Lighting<'a> {
             let met = placed.and_then(|placed| Some((placed, placed.meet(ray.origin, ray.direction)?)));
             if let Some((placed, (distance, at))) = met.filter(|(_, (distance, _))| *distance < limit) {
                 let radiance = self.radiance(number as usize, placed, ray.direction, at, wavelengths);
-                f(LightHit { light: LightId(number), distance, radiance, emitter: EmitterId(number) });
+                let point = ray.origin + distance * ray.direction;
+                f(LightHit { light: LightId(number), distance, radiance, emitter: EmitterId(number), point });
             }
         };
         let Some(tree) = &self.tree else {
@@ -451,14 +454,15 @@ impl<'a> Lighting<'a> {
                 continue;
             }
             let radiance = self.radiance(number as usize, placed, ray.direction, [0.0; 2], wavelengths);
-            f(LightHit { light: LightId(number), distance: f64::INFINITY, radiance, emitter: EmitterId(number) });
+            let (light, distance) = (LightId(number), f64::INFINITY);
+            f(LightHit { light, distance, radiance, emitter: EmitterId(number), point: ray.origin });
         }
     }
 
     /// What the surface at `hit` emits towards the ray that met it there: emissive materials and geometry lights.
     pub fn emitted<const N: usize>(&self, ray: &Ray, hit: &Hit, wavelengths: &Wavelengths<N>) -> Option<LightHit<N>> {
         let object = self.objects.find(hit.instance)?;
-        let emitter = || object.emitter(hit, ray.origin).map_or(EmitterId::NONE, EmitterId);
+        let emitter = || object.emitter(hit.primitive).map_or(EmitterId::NONE, EmitterId);
         let (radiance, light, emitter) = match object.source {
             Source::Light { sync: MaterialSync::Independent, .. } => {
                 let id = self.view.material_id(hit);
@@ -472,7 +476,8 @@ impl<'a> Lighting<'a> {
                 (radiance, self.id_of(source, hit), emitter())
             }
         };
-        (!radiance.is_black()).then_some(LightHit { light, distance: hit.distance, radiance, emitter })
+        let (distance, point) = (hit.distance, ray.origin + hit.distance * ray.direction);
+        (!radiance.is_black()).then_some(LightHit { light, distance, radiance, emitter, point })
     }
 }
 

@@ -331,19 +331,14 @@ impl Object {
         }
     }
 
-    /// The emitter of a primitive that a ray from `origin` met; `None` where it is not sampled, or not from there.
-    pub(super) fn emitter(&self, hit: &Hit, origin: DVec3) -> Option<u32> {
+    /// The emitter of a primitive; `None` where it is not sampled.
+    pub(super) fn emitter(&self, primitive: u32) -> Option<u32> {
         if let Surface::Nothing = self.surface {
             return None;
         }
-        if let Surface::Sphere(sphere) = &self.surface
-            && sphere.contains(origin) != hit.leaving
-        {
-            return None;
-        }
         let piece = match &self.pieces {
-            None => hit.primitive,
-            Some(pieces) => *pieces.get(hit.primitive as usize).filter(|&&piece| piece != u32::MAX)?,
+            None => primitive,
+            Some(pieces) => *pieces.get(primitive as usize).filter(|&&piece| piece != u32::MAX)?,
         };
         Some(self.first + piece)
     }

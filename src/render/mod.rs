@@ -197,6 +197,7 @@ fn render_here(scene: &Scene, plan: &Plan, registry: &Registry, control: &Contro
 
     let mut warnings = scene.diagnostics().clone();
     warnings.extend(&plan.diagnostics);
+    warnings.extend(&prepared.diagnostics());
     textures::report_unreadable(scene, &mut warnings)?;
     if counters.unmatched_exits > 0 {
         warnings.warn(

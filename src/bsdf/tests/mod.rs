@@ -3,6 +3,7 @@
 mod fresnel;
 mod furnace;
 mod laws;
+mod microfacet;
 mod sampling;
 mod smooth;
 mod support;

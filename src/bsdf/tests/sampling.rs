@@ -105,6 +105,7 @@ fn lanes_of_equal_index_are_one_lane() {
         let metal = match p.metal {
             Metal::Tint { f0, f82 } => Metal::Tint { f0: wide(f0), f82: wide(f82) },
             Metal::Index { n, k } => Metal::Index { n: wide(n), k: wide(k) },
+            Metal::Constant { f0 } => Metal::Constant { f0: wide(f0) },
         };
         Parameters::<4> {
             base_color: wide(p.base_color),
@@ -144,6 +145,34 @@ fn lanes_of_equal_index_are_one_lane() {
                 assert!((a.weight[0] - b.weight[lane]).abs() <= 1e-5 * a.weight[0], "{name}");
                 assert!((a.pdf[0] - b.pdf[lane]).abs() <= 1e-5 * a.pdf[0], "{name}");
             }
+        }
+    }
+}
+
+#[test]
+fn all_lanes_together_see_a_white_furnace() {
+    // Every lane in turn is the hero, and every lane's value is divided by the mean of the densities: the estimator of a path.
+    const SAMPLES: u32 = 1 << 14;
+    let turned: [Bsdf<4>; 4] = std::array::from_fn(|first| Bsdf::new(&dispersive(first)));
+    let ior = dispersive(0).interface.ior_t;
+    for cos in [0.9, 0.3] {
+        let mut sums = [0.0_f64; 4];
+        for (hero, bsdf) in turned.iter().enumerate() {
+            for i in 0..SAMPLES {
+                let u = [0, 1, 2].map(|dimension| sobol_burley::sample(i, dimension, hero as u32));
+                let Some(sample) = bsdf.sample(direction(cos), u[0], [u[1], u[2]]) else { continue };
+                let Scattered::Toward(wi) = sample.scattered else { panic!("is rough") };
+                let value = sample.weight * (sample.pdf.hero() / sample.pdf.mean());
+                for lane in 0..4 {
+                    // Lane `lane` of all is lane (lane − hero) of this one.
+                    let n = if wi.z < 0.0 { ior[lane] } else { 1.0 };
+                    sums[lane] += f64::from(value[(lane + 4 - hero) % 4] * n * n);
+                }
+            }
+        }
+        for (lane, sum) in sums.iter().enumerate() {
+            let mean = sum / f64::from(4 * SAMPLES);
+            assert!((mean - 1.0).abs() < 2e-3, "lane {lane} at {cos}: {mean}");
         }
     }
 }

@@ -19,6 +19,7 @@ use super::differentials::{self, Differentials};
 use super::lanes::Laws;
 use super::light_path::Expression;
 use super::{Integrator, PreparedIntegrator, Task, Worker};
+use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::{AOVS, Aov, COLOR, COLOR_CLEAN, Family, SAMPLE_COUNT, SPECTRAL, VARIANCE};
 use crate::film::pixel::PixelAccumulator;
@@ -125,6 +126,10 @@ impl PreparedIntegrator for Prepared<'_> {
         } else {
             Box::new(PathWorker::<LANES, false>::new(self))
         }
+    }
+
+    fn diagnostics(&self) -> Diagnostics {
+        self.lighting.diagnostics().clone()
     }
 }
 

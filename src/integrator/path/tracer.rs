@@ -70,6 +70,8 @@ struct State<const N: usize> {
     throughput: SampledSpectrum<N>,
     r: SampledSpectrum<N>,
     vertex: Option<Vertex<N>>,
+    /// The object of the last event: only lights that are linked to it count.
+    object: Option<u32>,
     depth: Depth,
     /// Since the camera light was only let through.
     sees_through: bool,
@@ -133,6 +135,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             throughput: SampledSpectrum::ONE,
             r: SampledSpectrum::ONE,
             vertex: None,
+            object: None,
             depth: Depth::default(),
             sees_through: true,
             alpha: 0.0,
@@ -188,15 +191,15 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     /// Adds the light that the path's ray has met.
     fn meet(&mut self, state: &State<N>, direction: DVec3, met: &LightHit<N>) {
         let lighting = self.setting.lighting;
+        if state.object.is_some_and(|object| !lighting.is_linked(met.light, object)) {
+            return;
+        }
         let emission = self.emission(met.light);
         let Some(vertex) = &state.vertex else {
             // Nothing but this way leads there.
             self.ledger.add(state.carried::<DISPERSIVE>() * met.radiance, emission);
             return;
         };
-        if !lighting.is_linked(met.light, vertex.receiver.object) {
-            return;
-        }
         let pdf = lighting.pdf(&vertex.receiver, direction, met);
         let mut seen = met.radiance;
         if let Some(light) = lighting.light(met.light)
@@ -265,6 +268,10 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         if let Some(emitted) = lighting.emitted(&walk.ray, &met.hit, &state.wavelengths) {
             self.meet(state, direction, &emitted);
         }
+        if lighting.replaces_material(&met.hit) {
+            return false;
+        }
+        state.object = Some(met.hit.instance);
         // The shading normal decides how light is scattered, the geometric one which side it is on.
         let toward = |n: DVec3| if direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
         let n_g = toward(met.surface.n_g);

@@ -62,11 +62,6 @@ impl Ellipsoid {
         self.area
     }
 
-    /// Whether a point is inside.
-    pub(in crate::lighting) fn contains(&self, p: DVec3) -> bool {
-        self.local(p).length() <= 1.0
-    }
-
     fn local(&self, p: DVec3) -> DVec3 {
         self.directions.local_from_render * (p - self.center)
     }
@@ -109,10 +104,16 @@ impl Ellipsoid {
         (along > 0.0).then_some(Toward { wi: image / stretch, distance: along * stretch, pdf_solid_angle })
     }
 
-    /// Of the direction `wi`, which meets it first where it is seen.
-    pub(in crate::lighting) fn pdf(&self, p: DVec3, wi: DVec3) -> f64 {
-        let Some(seen) = self.seen(self.local(p)) else { return 0.0 };
-        let shrink = (self.directions.local_from_render * wi).length();
+    /// Of the direction `wi`, which meets it at `distance`: 0 on the far side, which is only seen where the near one is not there.
+    pub(in crate::lighting) fn pdf(&self, p: DVec3, wi: DVec3, distance: f64) -> f64 {
+        let origin = self.local(p);
+        let Some(seen) = self.seen(origin) else { return 0.0 };
+        let d = self.directions.local_from_render * wi;
+        let shrink = d.length();
+        // Beyond the middle of the chord.
+        if matches!(seen, Seen::Cap { .. }) && distance * shrink * shrink > -origin.dot(d) {
+            return 0.0;
+        }
         self.directions.density(seen.density(), 1.0 / shrink)
     }
 

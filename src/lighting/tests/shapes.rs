@@ -35,7 +35,7 @@ impl Form {
         match self {
             Self::Rectangle(s) => s.meet(p, d).map(|(t, _)| (t, s.pdf(p, t))),
             Self::Disk(s) => s.meet(p, d).map(|t| (t, s.pdf(p, t))),
-            Self::Ellipsoid(s) => s.meet(p, d).map(|t| (t, s.pdf(p, d))),
+            Self::Ellipsoid(s) => s.meet(p, d).map(|t| (t, s.pdf(p, d, t))),
             Self::Tube(s) => s.meet(p, d).map(|t| (t, s.pdf(p, d))),
             Self::Triangle(s) => {
                 let [a, b, c] = s.corners();
@@ -273,7 +273,8 @@ fn what_glows_on_both_sides_is_seen_from_inside() {
         let Toward { wi, distance, pdf_solid_angle } = ball.sample(p, random.pair()).unwrap();
         assert!(((p + distance * wi - DVec3::X).length() - 2.0).abs() < 1e-12);
         assert!(
-            (pdf_solid_angle * 4.0 * PI - 1.0).abs() < 1e-12 && (ball.pdf(p, wi) / pdf_solid_angle - 1.0).abs() < 1e-12
+            (pdf_solid_angle * 4.0 * PI - 1.0).abs() < 1e-12
+                && (ball.pdf(p, wi, distance) / pdf_solid_angle - 1.0).abs() < 1e-12
         );
     }
 }
