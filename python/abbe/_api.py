@@ -77,6 +77,11 @@ class Options(TypedDict, total=False):
     wavelength: float | None
     band: tuple[float, float] | None
     dispersion_scale: float | None
+    max_depth: int | None
+    max_diffuse_depth: int | None
+    max_reflection_depth: int | None
+    max_transmission_depth: int | None
+    plate: str | None
     motion_blur: bool | None
     seed: int | None
     threads: int | None
@@ -587,6 +592,11 @@ def render(
     wavelength: float | None = None,
     band: tuple[float, float] | None = None,
     dispersion_scale: float | None = None,
+    max_depth: int | None = None,
+    max_diffuse_depth: int | None = None,
+    max_reflection_depth: int | None = None,
+    max_transmission_depth: int | None = None,
+    plate: str | os.PathLike[str] | None = None,
     motion_blur: bool | None = None,
     seed: int | None = None,
     threads: int | None = None,
@@ -632,6 +642,9 @@ def render(
     wavelength : reference wavelength, nm
     band : ends of the wavelength band of footprints, nm
     dispersion_scale : multiplies all dispersion: 0 none, 1 physical
+    max_depth, max_diffuse_depth, max_reflection_depth, max_transmission_depth : how often light may be scattered,
+        altogether (0 leaves what shines by itself, 1 direct light) or in one way; unlimited if None
+    plate : image file that is seen through glass, behind everything
     motion_blur : whether samples are spread over the time that the shutter is open
     seed : same seed, same bits, on any number of threads
     threads : all of the machine's if None
@@ -698,6 +711,11 @@ def render(
         wavelength=wavelength,
         band=band,
         dispersion_scale=dispersion_scale,
+        max_depth=max_depth,
+        max_diffuse_depth=max_diffuse_depth,
+        max_reflection_depth=max_reflection_depth,
+        max_transmission_depth=max_transmission_depth,
+        plate=None if plate is None else str(plate),
         motion_blur=motion_blur,
         seed=seed,
         threads=threads,

@@ -23,7 +23,9 @@ impl<const N: usize> CoatLobe<N> {
     pub(super) fn new(coat: &Coat<N>, interface: &Interface<N>) -> Self {
         let weight = coat.weight.clamp(0.0, 1.0);
         // As the base: no total reflection where the coat is the rarer medium.
-        let eta = (coat.ior / interface.ior_i.hero()).max(interface.ior_i.hero() / coat.ior);
+        // The mean over the lanes, not the hero's index: who the hero is must not tell.
+        let outside = interface.ior_i.mean();
+        let eta = (coat.ior / outside).max(outside / coat.ior);
         let colored = coat.color.0.iter().any(|&c| c < 1.0);
         Self {
             gloss: Gloss::new(weight, Fresnel::uniform(eta), coat.alpha, SampledSpectrum::ONE),

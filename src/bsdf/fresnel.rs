@@ -116,6 +116,14 @@ pub(super) fn weighted_eta(eta_ti: f32, weight: f32) -> f32 {
     (1.0 + epsilon) / (1.0 - epsilon)
 }
 
+/// A film needs an index; a metal of n = (1 + √F0)/(1 − √F0), k = 0 has this F0 (as Belcour & Barla do).
+fn index_of_f0<const N: usize>(f0: SampledSpectrum<N>) -> SampledSpectrum<N> {
+    f0.map(|f| {
+        let root = f.min(0.9999).sqrt();
+        (1.0 + root) / (1.0 - root)
+    })
+}
+
 /// The law by which an interface reflects.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Law<const N: usize> {
@@ -127,6 +135,8 @@ pub(super) enum Law<const N: usize> {
     Schlick(SampledSpectrum<N>),
     /// F0 and the coefficient of the tint at 82°.
     Tint(SampledSpectrum<N>, SampledSpectrum<N>),
+    /// The same at every angle.
+    Constant(SampledSpectrum<N>),
     /// Metal of relative index n + ik.
     Conductor(SampledSpectrum<N>, SampledSpectrum<N>),
 }
@@ -170,13 +180,13 @@ impl<const N: usize> Fresnel<N> {
             Metal::Tint { f0, f82 } => {
                 let f0 = f0.map(|f| f.clamp(0.0, 1.0));
                 let coefficient = f0.zip(f82, |f0, f82| tint_coefficient(f0, f82.clamp(0.0, 1.0)));
-                // A film needs an index; a metal of n = (1 + √F0)/(1 − √F0), k = 0 has this F0 (as Belcour & Barla do).
-                let index = f0.map(|f| {
-                    let root = f.min(0.9999).sqrt();
-                    (1.0 + root) / (1.0 - root)
-                });
-                let film = FilmStack::new(parameters, index, SampledSpectrum::ZERO);
+                let film = FilmStack::new(parameters, index_of_f0(f0), SampledSpectrum::ZERO);
                 Self { law: Law::Tint(f0, coefficient), film }
+            }
+            Metal::Constant { f0 } => {
+                let f0 = f0.map(|f| f.clamp(0.0, 1.0));
+                let film = FilmStack::new(parameters, index_of_f0(f0), SampledSpectrum::ZERO);
+                Self { law: Law::Constant(f0), film }
             }
         }
     }
@@ -192,6 +202,7 @@ impl<const N: usize> Fresnel<N> {
                 f0.map(|f0| f0 + (1.0 - f0) * rise)
             }
             Law::Tint(f0, a) => f0.zip(*a, |f0, a| tinted(cos_i, f0, a)),
+            Law::Constant(f0) => *f0,
             Law::Conductor(n, k) => n.zip(*k, |n, k| conductor(cos_i, n, k)),
         };
         match &self.film {
@@ -213,6 +224,7 @@ impl<const N: usize> Fresnel<N> {
         let mean = |f0: f32, a: f32| (f0 + (1.0 - f0) / 21.0 - a / 126.0).clamp(0.0, 1.0);
         match (&self.law, &self.film) {
             (Law::Tint(f0, a), None) => f0.zip(*a, mean),
+            (Law::Constant(f0), None) => *f0,
             _ => {
                 let f0 = self.at(1.0);
                 f0.zip(self.at(TINT_COSINE), |f0, at_82| {

@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 
-use super::albedo::{self, At, Roughness, Slice};
+use super::albedo::{self, Directional, Place, Roughness, Slice};
 use super::fresnel::{Fresnel, Law};
 use super::microfacet::Ggx;
 use super::{SMOOTH_ALPHA, Slices};
@@ -19,7 +19,7 @@ pub(super) struct Gloss<const N: usize> {
     pub(super) fresnel: Fresnel<N>,
     pub(super) ggx: Option<Ggx>,
     /// Directional albedo at weight and colour 1.
-    pub(super) albedo: Slices<N>,
+    pub(super) albedo: Directional<N>,
     pub(super) color: SampledSpectrum<N>,
 }
 
@@ -29,7 +29,7 @@ pub(super) fn distribution(alpha: [f32; 2]) -> Option<Ggx> {
 }
 
 /// Directional albedo of facets with this reflectance.
-fn rough_albedo<const N: usize>(fresnel: &Fresnel<N>, roughness: Roughness) -> Slices<N> {
+fn rough_albedo<const N: usize>(fresnel: &Fresnel<N>, roughness: &Roughness) -> Slices<N> {
     match fresnel.bare() {
         Some(Law::Uniform(eta)) => roughness.dielectric(*eta).map(SampledSpectrum::splat),
         Some(Law::Dielectric(eta)) => albedo::of_lanes(*eta, |eta| roughness.dielectric(eta)),
@@ -45,8 +45,8 @@ impl<const N: usize> Gloss<N> {
     pub(super) fn new(weight: f32, fresnel: Fresnel<N>, alpha: [f32; 2], color: SampledSpectrum<N>) -> Self {
         let ggx = distribution(alpha);
         let albedo = match &ggx {
-            None => std::array::from_fn(|i| fresnel.at(albedo::node(i))),
-            Some(ggx) => rough_albedo(&fresnel, Roughness::new(ggx.mean_alpha())),
+            None => Directional::upright(std::array::from_fn(|i| fresnel.at(albedo::node(i)))),
+            Some(ggx) => Directional::of_facets(ggx, |roughness| rough_albedo(&fresnel, roughness)),
         };
         Self { weight, fresnel, ggx, albedo, color }
     }
@@ -56,8 +56,10 @@ impl<const N: usize> Gloss<N> {
     /// It reflects f √(T(μ_o) T(μ_i)): T E where it is smooth. Over a rough lobe the mean of √T is needed, weighted by F. Facets that reflect
     /// much are seen at grazing angles, and send light to grazing angles, where T falls; so of the mean over the lobe of white facets
     /// and √T(μ) itself the latter counts for a quarter, which fits integration best. What is off then stands in docs/scattering.md.
-    pub(super) fn below(&self, above: Option<&Slice>) -> Slices<N> {
-        let Some(above) = above else { return self.albedo.map(|e| e.map(|e| (1.0 - self.weight * e).max(0.0))) };
+    pub(super) fn below(&self, above: Option<&Slice>) -> Directional<N> {
+        let Some(above) = above else {
+            return self.albedo.map(|albedo| albedo.map(|e| e.map(|e| (1.0 - self.weight * e).max(0.0))));
+        };
         let root = above.map(f32::sqrt);
         let back: Slice = match &self.ggx {
             None => root,
@@ -67,7 +69,9 @@ impl<const N: usize> Gloss<N> {
                 std::array::from_fn(|i| 0.25 * root[i] + 0.75 * leaving[i] / white[i].max(1e-6))
             }
         };
-        std::array::from_fn(|i| self.albedo[i].map(|e| (above[i] - self.weight * e * root[i] * back[i]).max(0.0)))
+        self.albedo.map(|albedo| {
+            std::array::from_fn(|i| albedo[i].map(|e| (above[i] - self.weight * e * root[i] * back[i]).max(0.0)))
+        })
     }
 
     /// f cos θ_i of the rough interface, without the layers over it.
@@ -78,7 +82,7 @@ impl<const N: usize> Gloss<N> {
 
     /// Albedo for a direction, for the choice of lobes.
     #[inline]
-    pub(super) fn importance(&self, at: &At) -> f32 {
-        self.weight * (at.of_spectra(&self.albedo) * self.color).mean()
+    pub(super) fn importance(&self, place: &Place) -> f32 {
+        self.weight * (self.albedo.at(place) * self.color).mean()
     }
 }

@@ -105,6 +105,11 @@ pub enum Metal<const N: usize> {
         /// Multiplies Schlick's reflectance near 82°; 1 is Schlick.
         f82: SampledSpectrum<N>,
     },
+    /// The same at every angle (UsdPreviewSurface: F0 = F90).
+    Constant {
+        /// Reflectance.
+        f0: SampledSpectrum<N>,
+    },
 }
 
 /// The indices of two media that meet.

@@ -236,7 +236,12 @@ fn plan_product(scene: &Scene, request: &Request, registry: &Registry, product: 
         texture_memory: textures::memory(request)?,
         integrator: integrator.name().to_owned(),
         layers,
-        depth_limits: request.depth_limits,
+        depth_limits: DepthLimits {
+            total: request.max_depth,
+            diffuse: request.max_diffuse_depth,
+            reflection: request.max_reflection_depth,
+            transmission: request.max_transmission_depth,
+        },
         plate: request.plate.clone(),
         optics,
         color_space,

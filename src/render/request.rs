@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::integrator::path::DepthLimits;
-
 /// A request; what it leaves open is taken from the stage's product, then its settings, then the defaults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -40,8 +38,14 @@ pub struct Request {
     pub band: Option<[f64; 2]>,
     /// Multiplies all dispersion: 0 none, 1 physical.
     pub dispersion_scale: Option<f64>,
-    /// How often light may be scattered: unlimited unless asked.
-    pub depth_limits: DepthLimits,
+    /// How often light may be scattered altogether: 0 leaves what shines by itself, 1 direct light. Unlimited if absent.
+    pub max_depth: Option<u32>,
+    /// How often diffusely.
+    pub max_diffuse_depth: Option<u32>,
+    /// How often it may be reflected by interfaces.
+    pub max_reflection_depth: Option<u32>,
+    /// How often it may be transmitted by interfaces.
+    pub max_transmission_depth: Option<u32>,
     /// Image file that is seen through glass, behind everything.
     pub plate: Option<String>,
     /// False closes all shutters at the frame.

@@ -34,6 +34,21 @@ pub fn tristimulus(power: impl Fn(Wavelength) -> f64) -> [f64; 3] {
     sum
 }
 
+/// X, Y, Z of the spectral power `power`, per nm and linear between whole nanometres, as the integral of the interpolated functions, which is
+/// what means over wavelengths of paths come to. [`tristimulus`], the sum, differs from it by 2e-5 for D65.
+pub fn tristimulus_integral(power: impl Fn(Wavelength) -> f64) -> [f64; 3] {
+    let at = |step: usize| power(Wavelength::from_nanometers(SHORTEST.nanometers() + step as f64));
+    let mut sum = [0.0; 3];
+    for (step, rows) in CIE_1931.windows(2).enumerate() {
+        let (here, next) = (at(step), at(step + 1));
+        for (sum, (response, next_response)) in sum.iter_mut().zip(rows[0].iter().zip(rows[1])) {
+            // The product of two straight lines.
+            *sum += (here * (2.0 * response + next_response) + next * (response + 2.0 * next_response)) / 6.0;
+        }
+    }
+    sum
+}
+
 /// Chromaticity x, y of a tristimulus value; `None` for black.
 pub fn chromaticity([x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
     let sum = x + y + z;

@@ -22,7 +22,7 @@ use super::sampled::{SampledSpectrum, Wavelengths};
 use super::{illuminant, response::Rec709};
 
 /// ∫ D65 ȳ dλ of the table that is 100 at 560 nm: what emission is divided by.
-static D65_LUMINANCE: LazyLock<f64> = LazyLock::new(|| observer::tristimulus(illuminant::d65)[1]);
+static D65_LUMINANCE: LazyLock<f64> = LazyLock::new(|| observer::tristimulus_integral(illuminant::d65)[1]);
 
 /// D65 per nm with Y = 1: the spectrum that an emission of RGB (1, 1, 1) has. Outside of 360–830 nm, that of the nearer end.
 pub fn white(wavelength: super::Wavelength) -> f64 {
@@ -100,14 +100,14 @@ impl ColorSpace {
 /// Each channel of Rec. 709 divided by what it is for [`white`].
 fn rec709_from_xyz() -> DMat3 {
     let standard = RgbSpace::REC709.rgb_from_xyz();
-    let white = standard * DVec3::from(observer::tristimulus(white));
+    let white = standard * DVec3::from(observer::tristimulus_integral(white));
     DMat3::from_diagonal(1.0 / white) * standard
 }
 
 /// The responses of R, G, B that [`ColorSpace::from_xyz`] of Rec. 709 has: ∫ white · response dλ = 1 in each channel.
 pub fn rec709(wavelength: super::Wavelength) -> DVec3 {
     static SCALE: LazyLock<DVec3> =
-        LazyLock::new(|| 1.0 / (RgbSpace::REC709.rgb_from_xyz() * DVec3::from(observer::tristimulus(white))));
+        LazyLock::new(|| 1.0 / (RgbSpace::REC709.rgb_from_xyz() * DVec3::from(observer::tristimulus_integral(white))));
     *SCALE * Rec709::default().at(wavelength)
 }
 
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn white_is_one_in_every_rgb_space() {
-        let white = DVec3::from(observer::tristimulus(white));
+        let white = DVec3::from(observer::tristimulus_integral(white));
         assert!((white.y - 1.0).abs() < 1e-14);
         for token in ["lin_rec709_scene", "lin_ap1_scene", "lin_ap0_scene", "lin_rec2020_scene", "lin_p3d65_scene"] {
             let space = ColorSpace::from_token(token).unwrap();
@@ -142,7 +142,7 @@ mod tests {
     fn the_estimate_has_the_integral_as_its_mean() {
         // A stratified mean over many heroes is a quadrature: linear spectra come out to its order.
         let spectrum = |nm: f64| 0.2 + 1e-3 * nm;
-        let wanted = DVec3::from(observer::tristimulus(|w| spectrum(w.nanometers())));
+        let wanted = DVec3::from(observer::tristimulus_integral(|w| spectrum(w.nanometers())));
         let count = 20_000;
         let mut sum = DVec3::ZERO;
         for i in 0..count {

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import abbe
+from abbe.check import check
 
 Slab = Callable[..., Path]
 Run = Callable[..., CompletedProcess[str]]
@@ -81,7 +82,7 @@ def test_spectra_are_arrays_with_named_bins(slab: Slab, tmp_path: Path) -> None:
     assert alone.channels("spectral")[0] == "425,000000nm"
     alone.write(tmp_path / "alone.exr")
     for name in ("both.exr", "alone.exr"):
-        report = abbe.check.check(tmp_path / name)
+        report = check(tmp_path / name)
         assert report.passed, report.failures
 
 
@@ -116,8 +117,9 @@ def test_tev_gets_the_pixels(slab: Slab) -> None:
 
     def listen() -> None:
         connection, _ = server.accept()
-        while part := connection.recv(1 << 16):
-            received.extend(part)
+        with connection:
+            while part := connection.recv(1 << 16):
+                received.extend(part)
 
     listener = threading.Thread(target=listen)
     listener.start()

@@ -29,7 +29,8 @@ def tristimulus(power: Array) -> Array:
     distribution = colour.SpectralDistribution(power, NM)
     observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
     equal = colour.sd_ones(colour.SpectralShape(360, 830, 1))
-    return np.asarray(colour.sd_to_XYZ(distribution, observer, equal, k=1, method="Integration"))
+    # It counts in hundredths.
+    return 100 * np.asarray(colour.sd_to_XYZ(distribution, observer, equal, k=1, method="Integration"))
 
 
 D65 = table(colour.SDS_ILLUMINANTS["D65"])

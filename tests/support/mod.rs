@@ -59,7 +59,8 @@ impl Stagehand {
         Self { document, arrays: Arrays::new() }
     }
 
-    fn surface(&mut self, path: &str, id: &str, inputs: &[(&str, Authored)], abbe: &[(&str, Authored)]) -> usize {
+    /// A material of one shader.
+    pub fn surface(&mut self, path: &str, id: &str, inputs: &[(&str, Authored)], abbe: &[(&str, Authored)]) -> usize {
         let map = |list: &[(&str, Authored)]| list.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
         self.document.materials.push(Material {
             path: path.into(),

@@ -225,6 +225,19 @@ def add_request(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--dispersion-scale", type=float, metavar="S", help="multiplies all dispersion: 0 none, 1 physical"
     )
+    for name, what in (
+        ("", "altogether: 0 leaves what shines by itself, 1 direct light"),
+        ("-diffuse", "diffusely"),
+        ("-reflection", "by reflection at interfaces"),
+        ("-transmission", "by transmission at interfaces"),
+    ):
+        group.add_argument(
+            f"--max{name}-depth",
+            type=int,
+            metavar="N",
+            help=f"how often light may be scattered {what}; unlimited unless given",
+        )
+    group.add_argument("--plate", metavar="FILE", help="image that is seen through glass, behind everything")
     add_scalar_ior(group)
     group.add_argument("--seed", type=int, metavar="N", help="same seed, same bits")
     group.add_argument(
@@ -262,6 +275,11 @@ def request(args: argparse.Namespace, from_stage: bool) -> Options:
         pixel_filter=args.pixel_filter,
         pixel_filter_width=args.pixel_filter_width,
         clamp=args.clamp,
+        max_depth=args.max_depth,
+        max_diffuse_depth=args.max_diffuse_depth,
+        max_reflection_depth=args.max_reflection_depth,
+        max_transmission_depth=args.max_transmission_depth,
+        plate=args.plate,
         depth_of_field=_switch(args.depth_of_field),
         motion_blur=_switch(args.motion_blur),
         integrator=args.integrator,

@@ -31,6 +31,9 @@ What is not given, the scene's render settings decide.
   --band LO:HI             wavelength band of footprints, nm
   --motion-blur on|off     spread samples over the shutter, or not; as the scene says unless given
   --dispersion-scale S     multiplies all dispersion: 0 none, 1 physical
+  --max-depth N            how often light may be scattered; --max-diffuse-depth, --max-reflection-depth,
+                           --max-transmission-depth by kind; unlimited unless given
+  --plate FILE             image that is seen through glass, behind everything
   --seed N                 same seed, same bits
   --threads N              all of the machine's unless given; never changes a bit
   --texture-memory MB      for the texels of images, 4294 unless given; never changes a bit
@@ -102,6 +105,11 @@ fn read(mut parser: lexopt::Parser) -> Result<Command> {
             "wavelength" => request.wavelength = Some(number(&mut parser, &option)?),
             "band" => request.band = Some(numbers(&mut parser, &option, ':', "LO:HI")?),
             "dispersion-scale" => request.dispersion_scale = Some(number(&mut parser, &option)?),
+            "max-depth" => request.max_depth = Some(number(&mut parser, &option)?),
+            "max-diffuse-depth" => request.max_diffuse_depth = Some(number(&mut parser, &option)?),
+            "max-reflection-depth" => request.max_reflection_depth = Some(number(&mut parser, &option)?),
+            "max-transmission-depth" => request.max_transmission_depth = Some(number(&mut parser, &option)?),
+            "plate" => request.plate = Some(text(&mut parser, &option)?),
             "seed" => request.seed = Some(number(&mut parser, &option)?),
             "texture-memory" => request.texture_memory = Some(number(&mut parser, &option)?),
             "threads" => request.threads = Some(number(&mut parser, &option)?),

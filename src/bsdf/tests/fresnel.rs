@@ -206,6 +206,16 @@ fn the_tint_of_a_metal_is_met_at_82_degrees() {
 }
 
 #[test]
+fn a_constant_metal_reflects_alike_at_every_angle() {
+    let f0 = SampledSpectrum([0.9_f32, 0.5, 0.0]);
+    let fresnel = Fresnel::of_metal(&Parameters { metal: Metal::Constant { f0 }, ..Parameters::default() });
+    for cos_i in [0.0, 0.1, 0.5, 1.0] {
+        assert_eq!(fresnel.at(cos_i), f0);
+    }
+    assert_eq!(fresnel.metal_mean(), f0);
+}
+
+#[test]
 fn specular_weight_scales_the_reflectance_at_normal_incidence() {
     for eta in [0.7, 1.3, 1.5] {
         for weight in [0.0, 0.3, 1.0, 2.0] {

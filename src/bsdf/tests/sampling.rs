@@ -105,6 +105,7 @@ fn lanes_of_equal_index_are_one_lane() {
         let metal = match p.metal {
             Metal::Tint { f0, f82 } => Metal::Tint { f0: wide(f0), f82: wide(f82) },
             Metal::Index { n, k } => Metal::Index { n: wide(n), k: wide(k) },
+            Metal::Constant { f0 } => Metal::Constant { f0: wide(f0) },
         };
         Parameters::<4> {
             base_color: wide(p.base_color),

@@ -1,12 +1,11 @@
 //! How many times light may be scattered: by kind, and altogether. Unlimited unless asked; limits lose light.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::bsdf::Event;
 
 /// Limits; `None` is no limit. What passes straight through a thin wall counts as transmitted, cut-outs do not count.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct DepthLimits {
     /// Of all events; 0 leaves what shines by itself, 1 direct light.
     pub total: Option<u32>,

@@ -23,8 +23,11 @@ use crate::diagnostics::Diagnostics;
 use crate::error::{Error, Result};
 use crate::film::aov::{AOVS, Aov, COLOR, COLOR_CLEAN, Family, SAMPLE_COUNT, SPECTRAL, VARIANCE};
 use crate::film::pixel::PixelAccumulator;
-use crate::lighting::Lighting;
-use crate::spectrum::{LANES, sensor, visible};
+use crate::light::Spectrum;
+use crate::lighting::{LightId, Lighting};
+use crate::spectrum::illuminant::Illuminant;
+use crate::spectrum::visible::Visible;
+use crate::spectrum::{LANES, Wavelength, sensor};
 pub use depth::DepthLimits;
 use plate::Plate;
 use tracer::{Setting, Tracer};
@@ -63,6 +66,8 @@ struct Prepared<'a> {
     /// Without any dispersion, if the clean beauty is asked for.
     clean: Option<Laws<'a>>,
     plate: Option<Plate>,
+    /// What wavelengths are drawn from.
+    visible: Visible,
     /// Of the layers that show parts of the light, in the order of `parts`.
     expressions: Vec<Expression>,
     /// Layers of the parts.
@@ -96,6 +101,7 @@ impl<'a> Prepared<'a> {
         Ok(Self {
             task,
             follower: Follower::of_camera(task.view, task.camera),
+            visible: visible(&lighting),
             lighting,
             laws: Laws::new(scene, task.optics.dispersion_scale)?,
             clean: if clean_layers.is_empty() { None } else { Some(Laws::new(scene, 0.0)?) },
@@ -117,6 +123,21 @@ impl<'a> Prepared<'a> {
             limits: self.task.depth_limits,
         }
     }
+}
+
+/// Wavelengths for the eye and for lights with lines; each spectrum counts once.
+fn visible(lighting: &Lighting<'_>) -> Visible {
+    let mut spectra: Vec<&Spectrum> = Vec::new();
+    let mut tables: Vec<Vec<(f64, f64)>> = Vec::new();
+    for light in (0..).map_while(|index| lighting.light(LightId(index))) {
+        let spectrum = &light.emission.spectrum;
+        if *spectrum != Spectrum::Illuminant(Illuminant::D65) && !spectra.contains(&spectrum) {
+            spectra.push(spectrum);
+            let power = |nm: u32| light.emission.white(Wavelength::from_nanometers(f64::from(nm)));
+            tables.push((360..=830).map(|nm| (f64::from(nm), power(nm))).collect());
+        }
+    }
+    Visible::with_lights(tables.iter().map(Vec::as_slice))
 }
 
 impl PreparedIntegrator for Prepared<'_> {
@@ -164,7 +185,7 @@ impl<const N: usize, const DISPERSIVE: bool> Worker for PathWorker<'_, N, DISPER
                 others.sample(&place, out);
             }
             let numbers = task.sampler.path(pixel, index);
-            let wavelengths = visible::sample::<N>(numbers.wavelength());
+            let wavelengths = self.prepared.visible.sample::<N>(numbers.wavelength());
             let start = task.camera.ray(&place);
             let color = |radiance| -> [f64; 3] {
                 let DVec3 { x, y, z } = self.color_from_xyz * sensor::xyz(radiance, &wavelengths);

@@ -1,7 +1,7 @@
-//! What a surface looks like: the inputs that are looked up where a ray meets it, constants or networks.
+//! What the specular chain asks of a surface: its albedo, and where it is there.
 //!
-//! One table of the shading models' inputs with the defaults of their node definitions; a program for each thing that is
-//! asked of a surface. An input that is driven by a network that is not understood has its default, with a warning.
+//! One table of the shading models' inputs with the defaults of their node definitions. What light transport asks is in
+//! [`surface`](super::surface).
 
 use crate::texture::{Function as F, Program, Register, TooLarge};
 
@@ -20,16 +20,6 @@ pub struct Appearance {
     /// What a denoiser calls albedo: the base colour of what is diffuse and the reflectance of a metal at normal incidence
     /// (in UsdPreviewSurface's specular workflow (1 − max f₀) diffuse + f₀), the tint of what transmits, 1 for clear glass.
     pub albedo: Program,
-    /// The colour of the base, its weight included.
-    pub base_color: Program,
-    /// Weight of the metal.
-    pub metallic: Program,
-    /// Roughness of the specular lobe.
-    pub roughness: Program,
-    /// Colour times weight of what the surface emits, in the shader's own unit; `None` where that is black.
-    pub emission: Option<Program>,
-    /// The normal map's texel as its network hands it on; `None` where there is none.
-    pub normal: Option<Program>,
     /// Where the surface is there, if that differs over it.
     pub opacity: Option<Opacity>,
 }
@@ -70,13 +60,9 @@ struct Model {
     base_color: (&'static str, [f32; 3]),
     base_weight: (&'static str, f32),
     metallic: (&'static str, f32),
-    roughness: (&'static str, f32),
     transmission: (&'static str, f32),
     /// The tint of what transmits, and the depth at which it is reached: beyond 0 it is the inside's.
     tint: (&'static str, &'static str),
-    emission_color: (&'static str, [f32; 3]),
-    emission_weight: (&'static str, f32),
-    normal: &'static str,
 }
 
 const ONE: (&str, f32) = ("", 1.0);
@@ -86,12 +72,8 @@ const STANDARD: Model = Model {
     base_color: ("base_color", [0.8; 3]),
     base_weight: ("base", 1.0),
     metallic: ("metalness", 0.0),
-    roughness: ("specular_roughness", 0.2),
     transmission: ("transmission", 0.0),
     tint: ("transmission_color", "transmission_depth"),
-    emission_color: ("emission_color", [1.0; 3]),
-    emission_weight: ("emission", 0.0),
-    normal: "normal",
 };
 
 const MODELS: &[Model] = &[
@@ -100,24 +82,16 @@ const MODELS: &[Model] = &[
         base_color: ("diffuseColor", [0.18; 3]),
         base_weight: ONE,
         metallic: ("metallic", 0.0),
-        roughness: ("roughness", 0.5),
         transmission: NONE,
         tint: ("", ""),
-        emission_color: ("emissiveColor", [0.0; 3]),
-        emission_weight: ONE,
-        normal: "normal",
     },
     Model {
         ids: &["ND_open_pbr_surface_surfaceshader", "arnold:openpbr_surface"],
         base_color: ("base_color", [0.8; 3]),
         base_weight: ("base_weight", 1.0),
         metallic: ("base_metalness", 0.0),
-        roughness: ("specular_roughness", 0.3),
         transmission: ("transmission_weight", 0.0),
         tint: ("transmission_color", "transmission_depth"),
-        emission_color: ("emission_color", [1.0; 3]),
-        emission_weight: ("emission_luminance", 0.0),
-        normal: "geometry_normal",
     },
     STANDARD,
     Model {
@@ -131,24 +105,16 @@ const MODELS: &[Model] = &[
         base_color: ("base_color", [1.0; 3]),
         base_weight: ONE,
         metallic: ("metallic", 1.0),
-        roughness: ("roughness", 1.0),
         transmission: ("transmission", 0.0),
         tint: ("base_color", ""),
-        emission_color: ("emissive", [0.0; 3]),
-        emission_weight: ("emissive_strength", 1.0),
-        normal: "normal",
     },
     Model {
         ids: &["ND_disney_principled"],
         base_color: ("baseColor", [0.16; 3]),
         base_weight: ONE,
         metallic: ("metallic", 0.0),
-        roughness: ("roughness", 0.5),
         transmission: ("specTrans", 0.0),
         tint: ("baseColor", ""),
-        emission_color: ("", [0.0; 3]),
-        emission_weight: NONE,
-        normal: "",
     },
 ];
 
@@ -164,15 +130,7 @@ impl Appearance {
     }
 
     fn constant(albedo: [f32; 4]) -> Self {
-        Self {
-            albedo: Program::constant(albedo),
-            base_color: Program::constant(albedo),
-            metallic: Program::constant([0.0; 4]),
-            roughness: Program::constant([0.0; 4]),
-            emission: None,
-            normal: None,
-            opacity: None,
-        }
+        Self { albedo: Program::constant(albedo), opacity: None }
     }
 
     /// Of the shader that `painter` reads. `is_glass` tells that the whole surface transmits by its opacity;
@@ -201,7 +159,6 @@ impl Painter<'_, '_, '_> {
         let weight = self.number(model.base_weight)?;
         let base = self.b().binary(F::Multiply, color, weight)?;
         let metallic = self.number(model.metallic)?;
-        let roughness = self.number(model.roughness)?;
         let mut albedo = self.specular_workflow(base)?;
         let transmission = self.number(model.transmission)?;
         if self.b().value(transmission) != Some([0.0; 4]) {
@@ -225,21 +182,8 @@ impl Painter<'_, '_, '_> {
         } else if is_glass && model.transmission == NONE {
             albedo = white;
         }
-        let emission_color = self.color(model.emission_color)?;
-        let emission_weight = self.number(model.emission_weight)?;
-        let emission = self.b().binary(F::Multiply, emission_color, emission_weight)?;
-        let is_black = matches!(self.b().value(emission), Some([r, g, b, _]) if [r, g, b].iter().all(|&x| x == 0.0));
-        let normal = self.networks.register(model.normal);
         let b = &self.networks.builder;
-        Ok(Appearance {
-            albedo: b.program(albedo)?,
-            base_color: b.program(base)?,
-            metallic: b.program(metallic)?,
-            roughness: b.program(roughness)?,
-            emission: if is_black { None } else { Some(b.program(emission)?) },
-            normal: normal.map(|normal| b.program(normal)).transpose()?,
-            opacity: opacity.map(|(_, opacity)| opacity),
-        })
+        Ok(Appearance { albedo: b.program(albedo)?, opacity: opacity.map(|(_, opacity)| opacity) })
     }
 
     fn opacity(&mut self, input: OpacityInput) -> Result<(Register, Opacity), TooLarge> {

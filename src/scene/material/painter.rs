@@ -164,6 +164,11 @@ impl<'a, 'n, 'd> Painter<'a, 'n, 'd> {
 
 /// Arithmetic.
 impl Painter<'_, '_, '_> {
+    /// Whether `x` is this number in all four places, and constant.
+    pub(super) fn is(&mut self, x: Register, number: f32) -> bool {
+        self.b().value(x) == Some([number; 4])
+    }
+
     pub(super) fn constant(&mut self, value: f32) -> Painted {
         self.b().number(value)
     }
@@ -182,10 +187,12 @@ impl Painter<'_, '_, '_> {
 
     pub(super) fn multiply(&mut self, x: Register, y: Register) -> Painted {
         // 1 leaves a value as it is, and costs nothing.
-        match (self.b().value(x), self.b().value(y)) {
-            (_, Some(one)) if one == [1.0; 4] => Ok(x),
-            (Some(one), _) if one == [1.0; 4] => Ok(y),
-            _ => self.b().binary(F::Multiply, x, y),
+        if self.is(y, 1.0) {
+            Ok(x)
+        } else if self.is(x, 1.0) {
+            Ok(y)
+        } else {
+            self.b().binary(F::Multiply, x, y)
         }
     }
 
@@ -226,10 +233,12 @@ impl Painter<'_, '_, '_> {
 
     /// x (1 − t) + y t; the ends themselves where t is constant.
     pub(super) fn mix(&mut self, x: Register, y: Register, t: Register) -> Painted {
-        match self.b().value(t) {
-            Some(zero) if zero == [0.0; 4] => Ok(x),
-            Some(one) if one == [1.0; 4] => Ok(y),
-            _ => self.b().ternary(F::Mix, y, x, t),
+        if self.is(t, 0.0) {
+            Ok(x)
+        } else if self.is(t, 1.0) {
+            Ok(y)
+        } else {
+            self.b().ternary(F::Mix, y, x, t)
         }
     }
 

@@ -17,8 +17,6 @@ use super::appearance::UNSTATED;
 use super::network::Networks;
 use super::painter::{Painted, Painter};
 
-/// The cosine of the angle at which F82 is stated (OpenPBR 1.1, section 3.5).
-const MU_82: f32 = 1.0 / 7.0;
 /// The highest index that is computed with; reflectances near 1 have none.
 const HIGHEST_INDEX: f32 = 1e4;
 
@@ -61,7 +59,7 @@ pub(super) enum MetalLayer {
     /// Reflectance at normal incidence, and the tint of Schlick's at 82°.
     Tint { f0: Register, f82: Register },
     /// The same reflectance at every angle.
-    Flat(Register),
+    Constant(Register),
     /// Reflectance at normal incidence and colour of the edge (O. Gulbrandsen, "Artist friendly metallic Fresnel", JCGT
     /// 3(4), 2014).
     Artistic { reflectivity: Register, edge: Register },
@@ -267,7 +265,7 @@ enum Emission {
 #[derive(Clone, Debug)]
 enum SurfaceMetal {
     Tint { f0: Tint, f82: Tint },
-    Flat(Tint),
+    Constant(Tint),
     Artistic { reflectivity: Tint, edge: Tint },
     Index(Box<Conductor>),
 }
@@ -445,9 +443,9 @@ impl Surface {
         let metal = match (conductor, layers.metal) {
             (Some(conductor), _) => SurfaceMetal::Index(Box::new(conductor)),
             // Nobody asks of a metal that is not there.
-            (None, _) if metalness.is_zero() => SurfaceMetal::Flat(Tint::White),
+            (None, _) if metalness.is_zero() => SurfaceMetal::Constant(Tint::White),
             (None, MetalLayer::Tint { f0, f82 }) => SurfaceMetal::Tint { f0: base(c.tint(f0)), f82: c.tint(f82) },
-            (None, MetalLayer::Flat(f0)) => SurfaceMetal::Flat(base(c.tint(f0))),
+            (None, MetalLayer::Constant(f0)) => SurfaceMetal::Constant(base(c.tint(f0))),
             (None, MetalLayer::Artistic { reflectivity, edge }) => {
                 SurfaceMetal::Artistic { reflectivity: base(c.tint(reflectivity)), edge: c.tint(edge) }
             }
@@ -627,10 +625,7 @@ impl Surface {
             SurfaceMetal::Tint { f0, f82 } => {
                 Metal::Tint { f0: f0.at(found, wavelengths), f82: f82.at(found, wavelengths) }
             }
-            SurfaceMetal::Flat(f0) => {
-                let f0 = f0.at(found, wavelengths);
-                Metal::Tint { f0, f82: f0.map(flat_tint) }
-            }
+            SurfaceMetal::Constant(f0) => Metal::Constant { f0: f0.at(found, wavelengths) },
             SurfaceMetal::Artistic { reflectivity, edge } => {
                 let reflectivity = reflectivity.at(found, wavelengths);
                 let edge = edge.at(found, wavelengths);
@@ -645,14 +640,6 @@ impl Surface {
             },
         }
     }
-}
-
-/// The tint at 82° with which the reflectance there is that at normal incidence: between, it is at most 0.033 (1 − f₀)
-/// less.
-fn flat_tint(f0: f32) -> f32 {
-    let rest = 1.0 - MU_82;
-    let fifth = (rest * rest) * (rest * rest) * rest;
-    f0 / (f0 + (1.0 - f0) * fifth)
 }
 
 /// n and k of Gulbrandsen's parameters: the reflectance r at normal incidence is kept, g moves n between its bounds.

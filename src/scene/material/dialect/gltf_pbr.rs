@@ -154,7 +154,7 @@ impl Dialect for GltfPbr {
             thickness_nm: p.number(IRIDESCENCE_THICKNESS)?,
             ior: p.number(IRIDESCENCE_IOR)?,
         };
-        let has_film = p.b().value(film.weight) != Some([0.0; 4]);
+        let has_film = !p.is(film.weight, 0.0);
         // KHR_materials_anisotropy: α_t = mix(α, 1, strength²), α_b = α.
         let roughness = p.number(ROUGHNESS)?;
         let (alpha, strength) = (p.square(roughness)?, p.number(ANISOTROPY_STRENGTH)?);
@@ -172,7 +172,7 @@ impl Dialect for GltfPbr {
             alpha: [along, alpha],
             transmission: p.number(TRANSMISSION)?,
             transmission_tint: color,
-            thin_walled: p.b().value(thickness) == Some([0.0; 4]),
+            thin_walled: p.is(thickness, 0.0),
             coat: Some(coat),
             sheen: Some(sheen),
             film: Some(film),

@@ -268,10 +268,10 @@ fn modulated_index(inputs: &Inputs<'_>, index: f64, source: &mut String, diagnos
 
 /// The same for inputs that are looked up.
 fn weighted_index(ior: Register, weight: Register, p: &mut Painter<'_, '_, '_>) -> Painted {
-    let one = p.constant(1.0)?;
-    if p.b().value(weight) == p.b().value(one) {
+    if p.is(weight, 1.0) {
         return Ok(ior);
     }
+    let one = p.constant(1.0)?;
     let (below, above) = (p.subtract(ior, one)?, p.add(ior, one)?);
     let (root_f0, root_weight) = (p.divide(below, above)?, p.sqrt(weight)?);
     let epsilon = p.multiply(root_f0, root_weight)?;
@@ -288,8 +288,7 @@ fn under_the_coat(
     coat_roughness: Register,
     p: &mut Painter<'_, '_, '_>,
 ) -> Painted {
-    let zero = Some([0.0; 4]);
-    if p.b().value(coat_weight) == zero || p.b().value(coat_roughness) == zero {
+    if p.is(coat_weight, 0.0) || p.is(coat_roughness, 0.0) {
         return Ok(roughness);
     }
     let (squared, coat_squared) = (p.square(roughness)?, p.square(coat_roughness)?);

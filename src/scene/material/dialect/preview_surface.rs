@@ -131,7 +131,7 @@ impl Dialect for PreviewSurface {
         Ok(Layers {
             schlick_f0: Some(f0_of(ior, p)?),
             metalness: p.number(METALLIC)?,
-            metal: MetalLayer::Flat(color),
+            metal: MetalLayer::Constant(color),
             ..layers
         })
     }

@@ -244,7 +244,7 @@ fn coat_gamma(coat: Register, p: &mut Painter<'_, '_, '_>) -> Painted {
 }
 
 fn saturated(color: Register, gamma: Register, p: &mut Painter<'_, '_, '_>) -> Painted {
-    if p.b().value(gamma) == Some([1.0; 4]) {
+    if p.is(gamma, 1.0) {
         return Ok(color);
     }
     let zero = p.constant(0.0)?;
