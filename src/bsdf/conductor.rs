@@ -9,7 +9,7 @@
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
-use super::albedo::{self, At, Roughness, Slice};
+use super::albedo::{self, At, Place, Roughness, Slice};
 use super::diffuse;
 use super::fresnel::Fresnel;
 use super::gloss;
@@ -77,10 +77,10 @@ impl<const N: usize> Conductor<N> {
     /// f cos θ_i of the rough metal; `through` is T(μ_o) T(μ_i).
     #[inline]
     pub(super) fn evaluate(&self, rough: &Rough<N>, pair: &Pair, through: f32) -> SampledSpectrum<N> {
-        let Pair { wo, wi, h, at_o, at_i } = pair;
+        let Pair { wo, wi, h, place_o, place_i } = pair;
         let single = rough.ggx.d(*h) * rough.ggx.visibility(*wo, *wi) * through * wi.z;
         let missing = |w: Vec3, at: &At| rough.ggx.at(w, at).of(&rough.missing);
-        let twice = missing(*wo, at_o) * missing(*wi, at_i) * wi.z;
+        let twice = missing(*wo, &place_o.at) * missing(*wi, &place_i.at) * wi.z;
         (self.fresnel.at(wo.dot(*h)) * single + rough.multiple * twice) * self.weight
     }
 }
@@ -105,19 +105,19 @@ impl<const N: usize> Rough<N> {
     /// Density per solid angle of [`Self::sample`].
     #[inline]
     pub(super) fn pdf(&self, pair: &Pair, above: f32) -> f32 {
-        let choice = self.choice(pair.wo, &pair.at_o, above);
+        let choice = self.choice(pair.wo, &pair.place_o.at, above);
         choice * pair.wi.z * FRAC_1_PI + (1.0 - choice) * self.ggx.reflecting_pdf(pair.wo, pair.h)
     }
 }
 
-/// Two directions above the surface, the vector halfway, and the nodes about their cosines.
+/// Two directions above the surface, the vector halfway, and where they look up what depends on them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pair {
     pub(super) wo: Vec3,
     pub(super) wi: Vec3,
     pub(super) h: Vec3,
-    pub(super) at_o: At,
-    pub(super) at_i: At,
+    pub(super) place_o: Place,
+    pub(super) place_i: Place,
 }
 
 /// Factor by which light reflected between a coat and a base of this albedo darkens the base (OpenPBR 1.1, "coat darkening"):

@@ -9,7 +9,7 @@
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
-use super::albedo::{self, At, NODES};
+use super::albedo::{self, At, NODES, Place, Slice};
 use crate::spectrum::SampledSpectrum;
 
 /// A GGX distribution.
@@ -25,14 +25,13 @@ impl Ggx {
         Self { alpha: Vec2::from(alpha).clamp(Vec2::splat(SHARPEST), Vec2::ONE) }
     }
 
-    /// α of the isotropic distribution whose directional albedo stands for this one's: the root of the mean of α², which masks a direction
-    /// of average azimuth.
+    /// α of the isotropic distribution that masks a direction of average azimuth as much: the root of the mean of α².
     pub(super) fn mean_alpha(&self) -> f32 {
         (0.5 * self.alpha.length_squared()).sqrt()
     }
 
-    /// The nodes at which albedos of the isotropic distribution of [`Self::mean_alpha`] stand for this one's in direction `w`: those of the
-    /// cosine at which it masks as much, as its Λ is a function of α tan θ. `upright` is the answer where α has no direction.
+    /// Where `w` looks up what isotropic facets of [`Self::mean_alpha`] hide from each other: at the cosine at which they mask as much as
+    /// these, as Λ is a function of α tan θ. `upright` is the answer where α has no direction.
     #[inline]
     pub(super) fn at(&self, w: Vec3, upright: &At) -> At {
         if self.is_isotropic() {
@@ -41,10 +40,6 @@ impl Ggx {
         let (x, y) = (self.alpha.x * w.x, self.alpha.y * w.y);
         let across = (x * x + y * y) / (0.5 * self.alpha.length_squared());
         At::cosine(w.z.abs() / (w.z * w.z + across).sqrt())
-    }
-
-    fn is_isotropic(&self) -> bool {
-        (self.alpha.x - self.alpha.y).abs() <= 1e-6 * self.alpha.x
     }
 
     /// The mean over azimuths of a function that is looked up by [`Self::at`].
@@ -68,6 +63,52 @@ impl Ggx {
             }
             sum * (1.0 / AZIMUTHS as f32)
         })
+    }
+
+    /// The lesser and the greater α.
+    pub(super) fn extremes(&self) -> [f32; 2] {
+        [self.alpha.min_element(), self.alpha.max_element()]
+    }
+
+    pub(super) fn is_isotropic(&self) -> bool {
+        (self.alpha.x - self.alpha.y).abs() <= 1e-6 * self.alpha.x
+    }
+
+    /// Where isotropic facets that reflect as much of F as these in direction `w` are between those of the lesser and of the greater α.
+    ///
+    /// Along the normal α² is the mean of α_x² and α_y²; at grazing angles light sees the facets along its azimuth, so that α² is
+    /// α_x² cos² φ + α_y² sin² φ.
+    #[inline]
+    pub(super) fn share(&self, w: Vec3) -> f32 {
+        if self.is_isotropic() {
+            return 0.0;
+        }
+        let squares = self.alpha * self.alpha;
+        let squared = 0.5 * (squares.x + squares.y + (squares.x - squares.y) * (w.x * w.x - w.y * w.y));
+        let [least, greatest] = self.extremes();
+        ((squared.max(0.0).sqrt() - least) / (greatest - least)).clamp(0.0, 1.0)
+    }
+
+    /// The mean of [`Self::share`] over azimuths, at the nodes.
+    pub(super) fn shares(&self) -> Slice {
+        /// Of a quarter turn; the share is smooth in the azimuth and even about both axes.
+        const AZIMUTHS: usize = 8;
+        if self.is_isotropic() {
+            return [0.0; NODES];
+        }
+        let turns: [f32; AZIMUTHS] = std::array::from_fn(|k| 0.5 * PI * (k as f32 + 0.5) / AZIMUTHS as f32);
+        std::array::from_fn(|i| {
+            let mu = albedo::node(i);
+            let sine = (1.0 - mu * mu).max(0.0).sqrt();
+            let share = |phi: &f32| self.share(Vec3::new(sine * libm::cosf(*phi), sine * libm::sinf(*phi), mu));
+            turns.iter().map(share).sum::<f32>() / AZIMUTHS as f32
+        })
+    }
+
+    /// Where `w` looks up what facets reflect.
+    #[inline]
+    pub(super) fn place(&self, w: Vec3) -> Place {
+        Place { at: At::cosine(w.z.abs()), share: self.share(w) }
     }
 
     /// D(h), per steradian.

@@ -11,14 +11,14 @@
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
-use super::albedo::{self, At, NODES, Slice};
+use super::albedo::{self, At, Directional, NODES, Place, Slice};
 use super::coat::CoatLobe;
 use super::conductor::{Conductor, Pair, darkening};
 use super::dielectric::{Dielectric, RoughDielectric, halfway};
 use super::diffuse::{self, OrenNayar};
 use super::fresnel::{self, Fresnel};
 use super::gloss::Gloss;
-use super::microfacet::mirror;
+use super::microfacet::{Ggx, mirror};
 use super::sheen::{self, SheenLobe};
 use super::{BsdfSample, Evaluated, Event, Parameters, Scattered, Slices};
 use crate::spectrum::SampledSpectrum;
@@ -26,6 +26,8 @@ use crate::spectrum::SampledSpectrum;
 /// All lobes of a surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stack<const N: usize> {
+    /// The facets of the base, of which all that depends on the azimuth is looked up.
+    facets: Ggx,
     sheen: Option<SheenLobe<N>>,
     coat: Option<CoatLobe<N>>,
     /// What passes the sheen.
@@ -55,7 +57,7 @@ struct Base<const N: usize> {
     /// 1/(π D_avg).
     scale: SampledSpectrum<N>,
     /// D at the nodes.
-    reached: Slices<N>,
+    reached: Directional<N>,
     rough: Option<RoughBase<N>>,
 }
 
@@ -63,8 +65,8 @@ struct Base<const N: usize> {
 #[derive(Clone, Copy, Debug)]
 struct RoughBase<const N: usize> {
     shape: OrenNayar,
-    /// D (1 − ∫ f_ss D), which multiple scattering makes up for.
-    missing: Slices<N>,
+    /// 1 − ∫ f_ss D: times D it is what multiple scattering makes up for.
+    lost: Slices<N>,
     /// Its colour over π times its mean.
     multiple: SampledSpectrum<N>,
 }
@@ -82,12 +84,15 @@ impl<const N: usize> Stack<N> {
     pub(super) fn new(parameters: &Parameters<N>) -> Self {
         let sheen = parameters.sheen.as_ref().filter(|s| s.weight > 0.0).map(SheenLobe::new);
         let below_sheen: Option<Slice> = sheen.as_ref().map(|s| s.albedo.map(|e| (1.0 - s.weight * e).clamp(0.0, 1.0)));
-        let coat = parameters.coat.as_ref().filter(|c| c.weight > 0.0).map(|c| CoatLobe::new(c, &parameters.interface));
-        let below_coat = match &coat {
-            None => below_sheen,
-            Some(coat) => Some(coat.gloss.below(below_sheen.as_ref()).map(|passed| passed[0])),
-        };
+        let coated = parameters
+            .coat
+            .as_ref()
+            .filter(|c| c.weight > 0.0)
+            .map(|c| CoatLobe::new(c, &parameters.interface, below_sheen.as_ref()));
+        let below_coat = coated.as_ref().map(|coated| coated.1).or(below_sheen);
+        let coat = coated.map(|coated| coated.0);
 
+        let facets = Ggx::new(parameters.alpha);
         let metalness = parameters.metalness.clamp(0.0, 1.0);
         let transmission = parameters.transmission.clamp(0.0, 1.0);
         let metal = (metalness > 0.0).then(|| Conductor::new(parameters, metalness, below_coat.as_ref()));
@@ -109,17 +114,16 @@ impl<const N: usize> Stack<N> {
             // Without an interface of the base, what passes the layers above reaches the base.
             let bare = parameters.specular_weight <= 0.0
                 || (parameters.schlick_f0.is_none() && parameters.film.is_none() && is_matched(eta));
-            gloss = (!bare).then(|| Gloss::new(1.0, fresnel, parameters.alpha, parameters.specular_color));
-            let reached = match &gloss {
-                None => below_coat.unwrap_or([1.0; NODES]).map(SampledSpectrum::splat),
-                Some(gloss) => gloss.below(below_coat.as_ref()),
+            let reflecting =
+                (!bare).then(|| Gloss::reflecting(1.0, fresnel, parameters.alpha, parameters.specular_color));
+            let reached = match &reflecting {
+                None => Directional::upright(below_coat.unwrap_or([1.0; NODES]).map(SampledSpectrum::splat)),
+                Some(reflecting) => reflecting.below(below_coat.as_ref()),
             };
-            base = Base::new(parameters, share, reached);
-            if let Some(gloss) = &mut gloss {
-                gloss.weight = share;
-            }
+            base = Base::new(parameters, share, reached, &facets.shares());
+            gloss = reflecting.map(|reflecting| Gloss { weight: share, ..reflecting.gloss });
         }
-        Self { sheen, coat, below_sheen, below_coat, metal, gloss, base, glass }
+        Self { facets, sheen, coat, below_sheen, below_coat, metal, gloss, base, glass }
     }
 
     /// Whether every lobe is smooth.
@@ -136,20 +140,20 @@ impl<const N: usize> Stack<N> {
     fn choices(&self, view: &View) -> [f32; LOBES] {
         let mut p = [0.0; LOBES];
         if let Some(sheen) = &self.sheen {
-            p[SHEEN] = sheen.importance(&view.at);
+            p[SHEEN] = sheen.importance(&view.place.at);
         }
-        if let Some(coat) = &self.coat {
-            p[COAT] = coat.gloss.importance(&view.at) * view.below_sheen;
+        if self.coat.is_some() {
+            p[COAT] = view.coat * view.below_sheen;
         }
         let through = view.below_coat * view.absorbed;
         if let Some(metal) = &self.metal {
             p[METAL] = metal.importance() * through;
         }
         if let Some(gloss) = &self.gloss {
-            p[GLOSS] = gloss.importance(&view.at) * through;
+            p[GLOSS] = gloss.importance(&view.place.at) * through;
         }
         if let Some(base) = &self.base {
-            p[BASE] = ((base.reflected + base.transmitted) * view.at.of_spectra(&base.reached)).mean() * view.absorbed;
+            p[BASE] = ((base.reflected + base.transmitted) * base.reached.at(&view.place)).mean() * view.absorbed;
         }
         if let Some(glass) = &self.glass {
             let weight = match glass {
@@ -164,10 +168,11 @@ impl<const N: usize> Stack<N> {
     }
 
     fn view(&self, wo: Vec3) -> View {
-        let at = At::cosine(wo.z);
-        let passed = |slice: &Option<Slice>| slice.as_ref().map_or(1.0, |s| at.of(s).clamp(0.0, 1.0));
+        let place = self.facets.place(wo);
+        let passed = |slice: &Option<Slice>| slice.as_ref().map_or(1.0, |s| place.at.of(s).clamp(0.0, 1.0));
         View {
-            at,
+            place,
+            coat: self.coat.as_ref().map_or(0.0, |coat| coat.gloss.importance(&place.at)),
             below_sheen: passed(&self.below_sheen),
             below_coat: passed(&self.below_coat),
             absorbed: self.coat.as_ref().map_or(1.0, |coat| coat.absorption(wo.z, Some(wo.z)).mean()),
@@ -190,7 +195,7 @@ impl<const N: usize> Stack<N> {
             })
         };
         let through = self.absorption(wo.z, Some(wo.z)) * view.below_coat;
-        let off = |ggx: super::microfacet::Ggx| mirror(wo, ggx.sample_reflecting(wo, u));
+        let off = |ggx: Ggx| mirror(wo, ggx.sample_reflecting(wo, u));
         let (wi, event) = match lobe {
             SHEEN => (diffuse::sample_cosine(u), Event::Diffuse),
             COAT => {
@@ -208,7 +213,9 @@ impl<const N: usize> Stack<N> {
                 let metal = self.metal.as_ref()?;
                 match &metal.rough {
                     None => return mirrored(metal.reflectance(wo.z) * through),
-                    Some(rough) => (rough.sample(wo, &view.at, view.below_coat, rest, u), Event::GlossyReflection),
+                    Some(rough) => {
+                        (rough.sample(wo, &view.place.at, view.below_coat, rest, u), Event::GlossyReflection)
+                    }
                 }
             }
             GLOSS => {
@@ -232,7 +239,7 @@ impl<const N: usize> Stack<N> {
                     return facet.sample(wo.z, rest, chosen, [through, once]);
                 }
                 Glass::Rough(rough) => {
-                    let wi = rough.sample(wo, &view.at, rest, u)?;
+                    let wi = rough.sample(wo, &view.place.at, rest, u)?;
                     (wi, if wi.z > 0.0 { Event::GlossyReflection } else { Event::GlossyTransmission })
                 }
             },
@@ -274,8 +281,9 @@ impl<const N: usize> Stack<N> {
         let mut pdf = 0.0;
         let absorption = self.absorption(wo.z, (wi.z > 0.0).then_some(wi.z));
         if wi.z > 0.0 {
-            let pair = Pair { wo, wi, h: halfway(wo, wi), at_o: view.at, at_i: At::cosine(wi.z) };
-            let passed = |slice: &Option<Slice>| slice.as_ref().map_or(1.0, |s| pair.at_i.of(s).clamp(0.0, 1.0));
+            let place_i = self.facets.place(wi);
+            let pair = Pair { wo, wi, h: halfway(wo, wi), place_o: view.place, place_i };
+            let passed = |slice: &Option<Slice>| slice.as_ref().map_or(1.0, |s| place_i.at.of(s).clamp(0.0, 1.0));
             let below_sheen = view.below_sheen * passed(&self.below_sheen);
             let below_coat = view.below_coat * passed(&self.below_coat);
             if let Some(sheen) = &self.sheen {
@@ -300,12 +308,12 @@ impl<const N: usize> Stack<N> {
                 pdf += choices[BASE] * base.share() * wi.z * FRAC_1_PI;
             }
         } else if let Some(base) = &self.base {
-            evaluated.diffuse += base.transmit(view, wi) * absorption;
+            evaluated.diffuse += base.transmit(view, wi, &self.facets) * absorption;
             pdf += choices[BASE] * (1.0 - base.share()) * -wi.z * FRAC_1_PI;
         }
         evaluated.pdf = SampledSpectrum::splat(pdf);
         if let Some(Glass::Rough(rough)) = &self.glass {
-            let valued = rough.evaluate(wo, wi, &view.at);
+            let valued = rough.evaluate(wo, wi, &view.place.at);
             // Reciprocal for what is reflected; what is transmitted does not know the other side's layers.
             let through = match (wi.z > 0.0, &self.below_coat) {
                 (_, None) => 1.0,
@@ -321,7 +329,9 @@ impl<const N: usize> Stack<N> {
 
 /// What is known of `wo`.
 struct View {
-    at: At,
+    place: Place,
+    /// The coat's importance.
+    coat: f32,
     below_sheen: f32,
     below_coat: f32,
     /// Mean of what the coat's colour leaves.
@@ -330,16 +340,16 @@ struct View {
 
 impl<const N: usize> Base<N> {
     /// `None` where it is black.
-    fn new(parameters: &Parameters<N>, share: f32, reached: Slices<N>) -> Option<Self> {
+    fn new(parameters: &Parameters<N>, share: f32, reached: Directional<N>, shares: &Slice) -> Option<Self> {
         let color = parameters.base_color;
-        let mean = albedo::mean_of_spectra(&reached);
+        let mean = reached.mean(shares);
         if (color + parameters.diffuse_transmission).is_black() || mean.max_element() <= 0.0 {
             return None;
         }
         let dark = darkening(parameters.coat.as_ref(), color, [1.0; 2]) * share;
         let scale = mean.map(|mean| if mean > 0.0 { FRAC_1_PI / mean } else { 0.0 });
         let shape = OrenNayar::new(parameters.diffuse_roughness);
-        let rough = (!shape.is_lambert()).then(|| RoughBase::new(shape, &reached, mean, color, dark));
+        let rough = (!shape.is_lambert()).then(|| RoughBase::new(shape, &reached, shares, color, dark));
         Some(Self {
             reflected: color * dark,
             transmitted: parameters.diffuse_transmission * dark,
@@ -358,19 +368,20 @@ impl<const N: usize> Base<N> {
     fn reflect(&self, pair: &Pair) -> SampledSpectrum<N> {
         match &self.rough {
             None => {
-                let reached = pair.at_o.of_spectra(&self.reached) * pair.at_i.of_spectra(&self.reached);
+                let reached = self.reached.at(&pair.place_o) * self.reached.at(&pair.place_i);
                 self.reflected * self.scale * reached * pair.wi.z
             }
             Some(rough) => {
-                let reached = pair.at_o.of_spectra(&self.reached) * pair.at_i.of_spectra(&self.reached);
-                let missing = pair.at_o.of_spectra(&rough.missing) * pair.at_i.of_spectra(&rough.missing);
-                (self.reflected * reached * rough.shape.single(pair.wo, pair.wi) + rough.multiple * missing) * pair.wi.z
+                let reached = self.reached.at(&pair.place_o) * self.reached.at(&pair.place_i);
+                let lost = pair.place_o.at.of_spectra(&rough.lost) * pair.place_i.at.of_spectra(&rough.lost);
+                (self.reflected * reached * rough.shape.single(pair.wo, pair.wi) + rough.multiple * lost * reached)
+                    * pair.wi.z
             }
         }
     }
 
-    fn transmit(&self, view: &View, wi: Vec3) -> SampledSpectrum<N> {
-        let reached = view.at.of_spectra(&self.reached) * At::cosine(-wi.z).of_spectra(&self.reached);
+    fn transmit(&self, view: &View, wi: Vec3, facets: &Ggx) -> SampledSpectrum<N> {
+        let reached = self.reached.at(&view.place) * self.reached.at(&facets.place(wi));
         self.transmitted * self.scale * reached * -wi.z
     }
 }
@@ -378,21 +389,19 @@ impl<const N: usize> Base<N> {
 impl<const N: usize> RoughBase<N> {
     fn new(
         shape: OrenNayar,
-        reached: &Slices<N>,
-        mean: SampledSpectrum<N>,
+        reached: &Directional<N>,
+        shares: &Slice,
         color: SampledSpectrum<N>,
         share: SampledSpectrum<N>,
     ) -> Self {
-        let mut missing = *reached;
-        for lane in 0..N {
-            let lane_reached: Slice = std::array::from_fn(|i| reached[i][lane]);
-            let peak = albedo::oren_nayar_leaving(&lane_reached);
-            for (i, missing) in missing.iter_mut().enumerate() {
-                let back = shape.a() * mean[lane] + shape.b() * peak[i];
-                missing[lane] *= (1.0 - back).max(0.0);
-            }
-        }
-        let missing_mean = albedo::mean_of_spectra(&missing);
+        let upright = reached.over_azimuths(shares);
+        let mean = albedo::mean_of_spectra(&upright);
+        let peaks: [Slice; N] =
+            std::array::from_fn(|lane| albedo::oren_nayar_leaving(&std::array::from_fn(|i| upright[i][lane])));
+        let lost: Slices<N> = std::array::from_fn(|i| {
+            SampledSpectrum::from_fn(|lane| (1.0 - shape.a() * mean[lane] - shape.b() * peaks[lane][i]).max(0.0))
+        });
+        let missing_mean = albedo::mean_of_spectra(&std::array::from_fn(|i| upright[i] * lost[i]));
         let multiple = SampledSpectrum::from_fn(|i| {
             if missing_mean[i] <= 0.0 {
                 return 0.0;
@@ -400,7 +409,7 @@ impl<const N: usize> RoughBase<N> {
             let got = (1.0 - missing_mean[i] / mean[i]).clamp(0.0, 1.0);
             diffuse::multiple(SampledSpectrum([color[i]]), got)[0] * share[i] * FRAC_1_PI / missing_mean[i]
         });
-        Self { shape, missing, multiple }
+        Self { shape, lost, multiple }
     }
 }
 

@@ -18,6 +18,8 @@ mod integrate;
 
 use std::sync::OnceLock;
 
+use super::Slices;
+use super::microfacet::Ggx;
 use crate::spectrum::SampledSpectrum;
 
 /// Cosines of a slice.
@@ -95,6 +97,65 @@ pub(super) fn mean_of_spectra<const N: usize>(slice: &[SampledSpectrum<N>; NODES
         sum += *s * *w;
     }
     sum
+}
+
+/// Where a direction looks up what depends on it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Its cosine.
+    pub(super) at: At,
+    /// Of anisotropic facets, the share of the rougher ones ([`Ggx::share`]).
+    pub(super) share: f32,
+}
+
+/// A function of the direction, at every wavelength: a slice, or for anisotropic facets two, those of isotropic facets of the lesser and of the
+/// greater α, which are mixed by azimuth.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Directional<const N: usize> {
+    sharper: Slices<N>,
+    rougher: Option<Slices<N>>,
+}
+
+impl<const N: usize> Directional<N> {
+    /// Of what depends on the cosine alone.
+    pub(super) fn upright(slices: Slices<N>) -> Self {
+        Self { sharper: slices, rougher: None }
+    }
+
+    /// Of a function of the roughness.
+    pub(super) fn of_facets(ggx: &Ggx, slices: impl Fn(&Roughness) -> Slices<N>) -> Self {
+        let [least, greatest] = ggx.extremes();
+        let rougher = (!ggx.is_isotropic()).then(|| slices(&Roughness::new(greatest)));
+        Self { sharper: slices(&Roughness::new(least)), rougher }
+    }
+
+    /// The values in a direction.
+    #[inline]
+    pub(super) fn at(&self, place: &Place) -> SampledSpectrum<N> {
+        let sharper = place.at.of_spectra(&self.sharper);
+        match &self.rougher {
+            None => sharper,
+            Some(rougher) => sharper.lerp(place.at.of_spectra(rougher), place.share),
+        }
+    }
+
+    /// `f` of the slices.
+    pub(super) fn map(&self, f: impl Fn(&Slices<N>) -> Slices<N>) -> Self {
+        Self { sharper: f(&self.sharper), rougher: self.rougher.as_ref().map(f) }
+    }
+
+    /// The mean over azimuths; `shares` is that of the shares ([`Ggx::shares`]).
+    pub(super) fn over_azimuths(&self, shares: &Slice) -> Slices<N> {
+        match &self.rougher {
+            None => self.sharper,
+            Some(rougher) => std::array::from_fn(|i| self.sharper[i].lerp(rougher[i], shares[i])),
+        }
+    }
+
+    /// The mean over diffuse light.
+    pub(super) fn mean(&self, shares: &Slice) -> SampledSpectrum<N> {
+        mean_of_spectra(&self.over_azimuths(shares))
+    }
 }
 
 /// A slice for the index ratio of every lane. Lanes of a glass are near to each other: the two outer ones are made, and between them the
