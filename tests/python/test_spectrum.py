@@ -19,8 +19,8 @@ NM = np.arange(360.0, 831.0)
 OBSERVER: Array = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].values
 TOLERANCE = 1e-4
 # Colorimetry sums over whole nanometres; means over a path's wavelengths are the integral of what is linear between
-# them. The two differ by a sixth of the product of the slopes per nm, relative: 1.2e-4 for a black body of 1000 K (3.5 %
-# per nm) and for the edges of the narrow bands of FL11, under 1e-4 for all else here.
+# them. The two differ by a sixth of the product of the slopes per nm, relative: 1.2e-4 for a black body of 1000 K
+# (3.5 % per nm) and for the edges of the narrow bands of FL11, under 1e-4 for all else here.
 STEEP = 1.5e-4
 
 
