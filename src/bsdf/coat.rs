@@ -3,6 +3,7 @@
 //! Light that reaches the base passes the coat twice, along 1/cos θ_t each; the colour is stated for going in and out
 //! at normal incidence, so the transmittance is color^{(1/cos θ_t(μ_o) + 1/cos θ_t(μ_i))/2} (Bouguer's law; OpenPBR 1.1).
 
+use super::albedo::{NODES, Slice};
 use super::fresnel::Fresnel;
 use super::gloss::Gloss;
 use super::{Coat, Interface};
@@ -20,19 +21,20 @@ pub(super) struct CoatLobe<const N: usize> {
 }
 
 impl<const N: usize> CoatLobe<N> {
-    pub(super) fn new(coat: &Coat<N>, interface: &Interface<N>) -> Self {
+    /// The coat, and what it leaves of the transmittance of the layers over it.
+    pub(super) fn new(coat: &Coat<N>, interface: &Interface<N>, above: Option<&Slice>) -> (Self, Slice) {
         let weight = coat.weight.clamp(0.0, 1.0);
         // As the base: no total reflection where the coat is the rarer medium.
         // The mean over the lanes, not the hero's index: who the hero is must not tell.
         let outside = interface.ior_i.mean();
         let eta = (coat.ior / outside).max(outside / coat.ior);
         let colored = coat.color.0.iter().any(|&c| c < 1.0);
-        Self {
-            gloss: Gloss::new(weight, Fresnel::uniform(eta), coat.alpha, SampledSpectrum::ONE),
-            weight,
-            eta,
-            half_log: colored.then(|| coat.color.map(|c| 0.5 * libm::logf(c.clamp(1e-12, 1.0)))),
-        }
+        let reflecting = Gloss::reflecting(weight, Fresnel::uniform(eta), coat.alpha, SampledSpectrum::ONE);
+        let gloss = reflecting.gloss;
+        let shares = gloss.ggx.map_or([0.0; NODES], |ggx| ggx.shares());
+        let below = reflecting.below(above).over_azimuths(&shares).map(|passed| passed[0]);
+        let half_log = colored.then(|| coat.color.map(|c| 0.5 * libm::logf(c.clamp(1e-12, 1.0))));
+        (Self { gloss, weight, eta, half_log }, below)
     }
 
     /// What its colour leaves of light between the base and a direction, and back to another one if there is one.

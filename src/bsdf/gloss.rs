@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 
-use super::albedo::{self, Directional, Place, Roughness, Slice};
+use super::albedo::{self, At, Directional, Roughness, Slice};
 use super::fresnel::{Fresnel, Law};
 use super::microfacet::Ggx;
 use super::{SMOOTH_ALPHA, Slices};
@@ -18,9 +18,15 @@ pub(super) struct Gloss<const N: usize> {
     pub(super) weight: f32,
     pub(super) fresnel: Fresnel<N>,
     pub(super) ggx: Option<Ggx>,
-    /// Directional albedo at weight and colour 1.
-    pub(super) albedo: Directional<N>,
     pub(super) color: SampledSpectrum<N>,
+    /// Mean over lanes and azimuths of the albedo with its colour at weight 1, for the choice of lobes.
+    pub(super) importance: Slice,
+}
+
+/// An interface with its directional albedo at weight and colour 1, which only the layers below ask for.
+pub(super) struct Reflecting<const N: usize> {
+    pub(super) gloss: Gloss<N>,
+    albedo: Directional<N>,
 }
 
 /// The distribution of a roughness, `None` for smooth.
@@ -42,36 +48,20 @@ fn rough_albedo<const N: usize>(fresnel: &Fresnel<N>, roughness: &Roughness) -> 
 }
 
 impl<const N: usize> Gloss<N> {
-    pub(super) fn new(weight: f32, fresnel: Fresnel<N>, alpha: [f32; 2], color: SampledSpectrum<N>) -> Self {
+    pub(super) fn reflecting(
+        weight: f32,
+        fresnel: Fresnel<N>,
+        alpha: [f32; 2],
+        color: SampledSpectrum<N>,
+    ) -> Reflecting<N> {
         let ggx = distribution(alpha);
         let albedo = match &ggx {
             None => Directional::upright(std::array::from_fn(|i| fresnel.at(albedo::node(i)))),
             Some(ggx) => Directional::of_facets(ggx, |roughness| rough_albedo(&fresnel, roughness)),
         };
-        Self { weight, fresnel, ggx, albedo, color }
-    }
-
-    /// What it leaves of the transmittance of the layers over it.
-    ///
-    /// It reflects f √(T(μ_o) T(μ_i)): T E where it is smooth. Over a rough lobe the mean of √T is needed, weighted by F. Facets that reflect
-    /// much are seen at grazing angles, and send light to grazing angles, where T falls; so of the mean over the lobe of white facets
-    /// and √T(μ) itself the latter counts for a quarter, which fits integration best. What is off then stands in docs/scattering.md.
-    pub(super) fn below(&self, above: Option<&Slice>) -> Directional<N> {
-        let Some(above) = above else {
-            return self.albedo.map(|albedo| albedo.map(|e| e.map(|e| (1.0 - self.weight * e).max(0.0))));
-        };
-        let root = above.map(f32::sqrt);
-        let back: Slice = match &self.ggx {
-            None => root,
-            Some(ggx) => {
-                let roughness = Roughness::new(ggx.mean_alpha());
-                let (leaving, white) = (roughness.leaving(&root), roughness.white());
-                std::array::from_fn(|i| 0.25 * root[i] + 0.75 * leaving[i] / white[i].max(1e-6))
-            }
-        };
-        self.albedo.map(|albedo| {
-            std::array::from_fn(|i| albedo[i].map(|e| (above[i] - self.weight * e * root[i] * back[i]).max(0.0)))
-        })
+        let shares = ggx.map_or([0.0; albedo::NODES], |ggx| ggx.shares());
+        let importance = albedo.over_azimuths(&shares).map(|e| (e * color).mean());
+        Reflecting { gloss: Self { weight, fresnel, ggx, color, importance }, albedo }
     }
 
     /// f cos θ_i of the rough interface, without the layers over it.
@@ -82,7 +72,32 @@ impl<const N: usize> Gloss<N> {
 
     /// Albedo for a direction, for the choice of lobes.
     #[inline]
-    pub(super) fn importance(&self, place: &Place) -> f32 {
-        self.weight * (self.albedo.at(place) * self.color).mean()
+    pub(super) fn importance(&self, at: &At) -> f32 {
+        self.weight * at.of(&self.importance)
+    }
+}
+
+impl<const N: usize> Reflecting<N> {
+    /// What it leaves of the transmittance of the layers over it.
+    ///
+    /// It reflects f √(T(μ_o) T(μ_i)): T E where it is smooth. Over a rough lobe the mean of √T is needed, weighted by F. Facets that reflect
+    /// much are seen at grazing angles, and send light to grazing angles, where T falls; so of the mean over the lobe of white facets
+    /// and √T(μ) itself the latter counts for a quarter, which fits integration best. What is off then stands in docs/scattering.md.
+    pub(super) fn below(&self, above: Option<&Slice>) -> Directional<N> {
+        let Some(above) = above else {
+            return self.albedo.map(|albedo| albedo.map(|e| e.map(|e| (1.0 - self.gloss.weight * e).max(0.0))));
+        };
+        let root = above.map(f32::sqrt);
+        let back: Slice = match &self.gloss.ggx {
+            None => root,
+            Some(ggx) => {
+                let roughness = Roughness::new(ggx.mean_alpha());
+                let (leaving, white) = (roughness.leaving(&root), roughness.white());
+                std::array::from_fn(|i| 0.25 * root[i] + 0.75 * leaving[i] / white[i].max(1e-6))
+            }
+        };
+        self.albedo.map(|albedo| {
+            std::array::from_fn(|i| albedo[i].map(|e| (above[i] - self.gloss.weight * e * root[i] * back[i]).max(0.0)))
+        })
     }
 }

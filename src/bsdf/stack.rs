@@ -20,7 +20,7 @@ use super::fresnel::{self, Fresnel};
 use super::gloss::Gloss;
 use super::microfacet::{Ggx, mirror};
 use super::sheen::{self, SheenLobe};
-use super::{BsdfSample, Evaluated, Event, Parameters, Scattered};
+use super::{BsdfSample, Evaluated, Event, Parameters, Scattered, Slices};
 use crate::spectrum::SampledSpectrum;
 
 /// All lobes of a surface.
@@ -65,8 +65,8 @@ struct Base<const N: usize> {
 #[derive(Clone, Copy, Debug)]
 struct RoughBase<const N: usize> {
     shape: OrenNayar,
-    /// D (1 − ∫ f_ss D), which multiple scattering makes up for.
-    missing: Directional<N>,
+    /// 1 − ∫ f_ss D: times D it is what multiple scattering makes up for.
+    lost: Slices<N>,
     /// Its colour over π times its mean.
     multiple: SampledSpectrum<N>,
 }
@@ -84,14 +84,13 @@ impl<const N: usize> Stack<N> {
     pub(super) fn new(parameters: &Parameters<N>) -> Self {
         let sheen = parameters.sheen.as_ref().filter(|s| s.weight > 0.0).map(SheenLobe::new);
         let below_sheen: Option<Slice> = sheen.as_ref().map(|s| s.albedo.map(|e| (1.0 - s.weight * e).clamp(0.0, 1.0)));
-        let coat = parameters.coat.as_ref().filter(|c| c.weight > 0.0).map(|c| CoatLobe::new(c, &parameters.interface));
-        let below_coat = match &coat {
-            None => below_sheen,
-            Some(coat) => {
-                let shares = coat.gloss.ggx.map_or([0.0; NODES], |ggx| ggx.shares());
-                Some(coat.gloss.below(below_sheen.as_ref()).over_azimuths(&shares).map(|passed| passed[0]))
-            }
-        };
+        let coated = parameters
+            .coat
+            .as_ref()
+            .filter(|c| c.weight > 0.0)
+            .map(|c| CoatLobe::new(c, &parameters.interface, below_sheen.as_ref()));
+        let below_coat = coated.as_ref().map(|coated| coated.1).or(below_sheen);
+        let coat = coated.map(|coated| coated.0);
 
         let facets = Ggx::new(parameters.alpha);
         let metalness = parameters.metalness.clamp(0.0, 1.0);
@@ -115,15 +114,14 @@ impl<const N: usize> Stack<N> {
             // Without an interface of the base, what passes the layers above reaches the base.
             let bare = parameters.specular_weight <= 0.0
                 || (parameters.schlick_f0.is_none() && parameters.film.is_none() && is_matched(eta));
-            gloss = (!bare).then(|| Gloss::new(1.0, fresnel, parameters.alpha, parameters.specular_color));
-            let reached = match &gloss {
+            let reflecting =
+                (!bare).then(|| Gloss::reflecting(1.0, fresnel, parameters.alpha, parameters.specular_color));
+            let reached = match &reflecting {
                 None => Directional::upright(below_coat.unwrap_or([1.0; NODES]).map(SampledSpectrum::splat)),
-                Some(gloss) => gloss.below(below_coat.as_ref()),
+                Some(reflecting) => reflecting.below(below_coat.as_ref()),
             };
             base = Base::new(parameters, share, reached, &facets.shares());
-            if let Some(gloss) = &mut gloss {
-                gloss.weight = share;
-            }
+            gloss = reflecting.map(|reflecting| Gloss { weight: share, ..reflecting.gloss });
         }
         Self { facets, sheen, coat, below_sheen, below_coat, metal, gloss, base, glass }
     }
@@ -152,7 +150,7 @@ impl<const N: usize> Stack<N> {
             p[METAL] = metal.importance() * through;
         }
         if let Some(gloss) = &self.gloss {
-            p[GLOSS] = gloss.importance(&view.place) * through;
+            p[GLOSS] = gloss.importance(&view.place.at) * through;
         }
         if let Some(base) = &self.base {
             p[BASE] = ((base.reflected + base.transmitted) * base.reached.at(&view.place)).mean() * view.absorbed;
@@ -174,10 +172,7 @@ impl<const N: usize> Stack<N> {
         let passed = |slice: &Option<Slice>| slice.as_ref().map_or(1.0, |s| place.at.of(s).clamp(0.0, 1.0));
         View {
             place,
-            coat: self.coat.as_ref().map_or(0.0, |coat| {
-                let share = coat.gloss.ggx.map_or(0.0, |ggx| ggx.share(wo));
-                coat.gloss.importance(&Place { share, ..place })
-            }),
+            coat: self.coat.as_ref().map_or(0.0, |coat| coat.gloss.importance(&place.at)),
             below_sheen: passed(&self.below_sheen),
             below_coat: passed(&self.below_coat),
             absorbed: self.coat.as_ref().map_or(1.0, |coat| coat.absorption(wo.z, Some(wo.z)).mean()),
@@ -378,8 +373,9 @@ impl<const N: usize> Base<N> {
             }
             Some(rough) => {
                 let reached = self.reached.at(&pair.place_o) * self.reached.at(&pair.place_i);
-                let missing = rough.missing.at(&pair.place_o) * rough.missing.at(&pair.place_i);
-                (self.reflected * reached * rough.shape.single(pair.wo, pair.wi) + rough.multiple * missing) * pair.wi.z
+                let lost = pair.place_o.at.of_spectra(&rough.lost) * pair.place_i.at.of_spectra(&rough.lost);
+                (self.reflected * reached * rough.shape.single(pair.wo, pair.wi) + rough.multiple * lost * reached)
+                    * pair.wi.z
             }
         }
     }
@@ -402,15 +398,10 @@ impl<const N: usize> RoughBase<N> {
         let mean = albedo::mean_of_spectra(&upright);
         let peaks: [Slice; N] =
             std::array::from_fn(|lane| albedo::oren_nayar_leaving(&std::array::from_fn(|i| upright[i][lane])));
-        let missing = reached.map(|reached| {
-            std::array::from_fn(|i| {
-                SampledSpectrum::from_fn(|lane| {
-                    let back = shape.a() * mean[lane] + shape.b() * peaks[lane][i];
-                    reached[i][lane] * (1.0 - back).max(0.0)
-                })
-            })
+        let lost: Slices<N> = std::array::from_fn(|i| {
+            SampledSpectrum::from_fn(|lane| (1.0 - shape.a() * mean[lane] - shape.b() * peaks[lane][i]).max(0.0))
         });
-        let missing_mean = missing.mean(shares);
+        let missing_mean = albedo::mean_of_spectra(&std::array::from_fn(|i| upright[i] * lost[i]));
         let multiple = SampledSpectrum::from_fn(|i| {
             if missing_mean[i] <= 0.0 {
                 return 0.0;
@@ -418,7 +409,7 @@ impl<const N: usize> RoughBase<N> {
             let got = (1.0 - missing_mean[i] / mean[i]).clamp(0.0, 1.0);
             diffuse::multiple(SampledSpectrum([color[i]]), got)[0] * share[i] * FRAC_1_PI / missing_mean[i]
         });
-        Self { shape, missing, multiple }
+        Self { shape, lost, multiple }
     }
 }
 

@@ -71,17 +71,26 @@ pub(super) struct Chooser {
     pub(super) normal: Option<DVec3>,
 }
 
-/// Lights, while they are collected; bounded ones by their emitter.
+/// Lights, while they are collected.
 #[derive(Debug, Default)]
 pub(super) struct Candidates {
-    sets: Vec<(Option<u32>, Vec<(u32, LightBounds)>, Vec<Infinite>)>,
+    sets: Vec<Collected>,
+}
+
+/// Lights that illuminate the same objects, while they are collected.
+#[derive(Debug, Default)]
+struct Collected {
+    illuminates: Option<u32>,
+    /// By their emitter.
+    bounded: Vec<(u32, LightBounds)>,
+    infinite: Vec<Infinite>,
 }
 
 impl Candidates {
-    fn set(&mut self, illuminates: Option<u32>) -> &mut (Option<u32>, Vec<(u32, LightBounds)>, Vec<Infinite>) {
-        let known = self.sets.iter().position(|set| set.0 == illuminates);
+    fn set(&mut self, illuminates: Option<u32>) -> &mut Collected {
+        let known = self.sets.iter().position(|set| set.illuminates == illuminates);
         let index = known.unwrap_or_else(|| {
-            self.sets.push((illuminates, Vec::new(), Vec::new()));
+            self.sets.push(Collected { illuminates, ..Collected::default() });
             self.sets.len() - 1
         });
         &mut self.sets[index]
@@ -90,13 +99,13 @@ impl Candidates {
     pub(super) fn add(&mut self, illuminates: Option<u32>, emitter: u32, bounds: LightBounds) {
         let is_usable = bounds.intensity > 0.0 && bounds.intensity.is_finite() && bounds.bounds.reach().is_finite();
         if is_usable {
-            self.set(illuminates).1.push((emitter, bounds));
+            self.set(illuminates).bounded.push((emitter, bounds));
         }
     }
 
     pub(super) fn add_infinite(&mut self, illuminates: Option<u32>, infinite: Infinite) {
         if infinite.irradiance > 0.0 {
-            self.set(illuminates).2.push(infinite);
+            self.set(illuminates).infinite.push(infinite);
         }
     }
 
@@ -104,7 +113,7 @@ impl Candidates {
     pub(super) fn build(self, emitters: usize) -> (Choice, Vec<Place>) {
         let mut places = vec![Place::Nowhere; emitters];
         let mut sets = Vec::new();
-        for (illuminates, bounded, infinite) in self.sets {
+        for Collected { illuminates, bounded, infinite } in self.sets {
             let set = sets.len() as u32;
             for (index, light) in infinite.iter().enumerate() {
                 places[light.emitter as usize] = Place::Infinite { set, index: index as u32 };

@@ -2,11 +2,42 @@
 //!
 //! L(λ) = white(λ) · filter(λ), where the filter is the colour, made a spectrum ([`Unbounded`]).
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::light::{Emission, White};
 use crate::spectrum::reflectance::Unbounded;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
+
+/// Colours that are solved for one by one; of more, the table's spectra have the same colours.
+const MAX_SOLVED: usize = 256;
+
+/// Makes colours spectra, each once: a thousand lights have a few colours, but for their intensity.
+#[derive(Debug, Default)]
+pub(super) struct Filters {
+    /// Of a colour whose greatest channel is 1.
+    known: HashMap<[u32; 3], Unbounded>,
+}
+
+impl Filters {
+    fn of(&mut self, rgb: [f64; 3]) -> Unbounded {
+        let greatest = rgb[0].max(rgb[1]).max(rgb[2]);
+        if !(greatest > 0.0 && greatest.is_finite()) {
+            return Unbounded::exact([0.0; 3]);
+        }
+        let key = rgb.map(|channel| ((channel / greatest) as f32).to_bits());
+        let solved = match self.known.get(&key) {
+            Some(known) => *known,
+            None if self.known.len() >= MAX_SOLVED => return Unbounded::of_color(rgb.map(|channel| channel as f32)),
+            None => {
+                let solved = Unbounded::exact(rgb.map(|channel| channel / greatest));
+                self.known.insert(key, solved);
+                solved
+            }
+        };
+        Unbounded { scale: (f64::from(solved.scale) * greatest) as f32, ..solved }
+    }
+}
 
 /// The emission of a light, ready for wavelengths.
 #[derive(Clone, Debug)]
@@ -17,8 +48,8 @@ pub(super) struct Color {
 }
 
 impl Color {
-    pub(super) fn new(emission: &Emission) -> Self {
-        Self { rgb: emission.rgb, filter: Unbounded::exact(emission.rgb), white: Arc::clone(emission.white_table()) }
+    pub(super) fn new(emission: &Emission, filters: &mut Filters) -> Self {
+        Self { rgb: emission.rgb, filter: filters.of(emission.rgb), white: Arc::clone(emission.white_table()) }
     }
 
     /// `rgb` over D65.

@@ -23,7 +23,7 @@ mod tree;
 use glam::{DVec3, Vec3};
 
 use self::choice::{Candidates, Choice, Chooser, Place};
-use self::color::Color;
+use self::color::{Color, Filters};
 use self::cone::Cone;
 use self::emitter::{Form, Placed, hull, looked_up, texture_coordinates};
 use self::objects::{Objects, Piece, Source, hit_at};
@@ -142,7 +142,8 @@ impl<'a> Lighting<'a> {
         let lights = compiled.lights;
         let images = LightImages::read(view.scene, &lights)?;
         diagnostics.extend(&images.diagnostics);
-        let colors: Vec<Color> = lights.iter().map(|light| Color::new(&light.emission)).collect();
+        let mut filters = Filters::default();
+        let colors: Vec<Color> = lights.iter().map(|light| Color::new(&light.emission, &mut filters)).collect();
         let placed: Vec<Option<Placed>> = lights.iter().map(|light| Placed::new(light, &images, view.origin)).collect();
         let mut emitters = vec![Emitter::Light; lights.len()];
         let mut candidates = Candidates::default();
