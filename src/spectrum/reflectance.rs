@@ -64,9 +64,8 @@ pub fn coefficients(rgb: [f64; 3]) -> [f64; 3] {
     if color.max_element() - color.min_element() <= 0.0 {
         return [inverse_sigmoid(color.x), 0.0, 0.0];
     }
-    /// A fit of this curve.
-    type CurveFit = Fit<fn(f64) -> Curve>;
-    static FIT: LazyLock<CurveFit> = LazyLock::new(|| Fit::new(curve));
+    type Sigmoids = Fit<fn(f64) -> Curve>;
+    static FIT: LazyLock<Sigmoids> = LazyLock::new(|| Fit::new(curve));
     FIT.solve(color, inverse_sigmoid(mean)).into()
 }
 

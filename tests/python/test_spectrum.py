@@ -18,6 +18,10 @@ Array = npt.NDArray[np.float64]
 NM = np.arange(360.0, 831.0)
 OBSERVER: Array = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].values
 TOLERANCE = 1e-4
+# Colorimetry sums over whole nanometres; means over a path's wavelengths are the integral of what is linear between
+# them. The two differ by a sixth of the product of the slopes per nm, relative: 1.2e-4 for a black body of 1000 K
+# (3.5 % per nm) and for the edges of the narrow bands of FL11, under 1e-4 for all else here.
+STEEP = 1.5e-4
 
 
 def table(distribution: colour.SpectralDistribution) -> Array:
@@ -54,7 +58,7 @@ def acescg(xyz: Array) -> Array:
     return np.asarray(colour.RGB_to_RGB(rec709(xyz), source, target, chromatic_adaptation_transform="Bradford"))
 
 
-def compare(power: Array, lines: bool = False) -> None:
+def compare(power: Array, tolerance: float = TOLERANCE) -> None:
     """Compare all three spaces, the light scaled to Y = 1."""
     power = power / tristimulus(power)[1]
     xyz = tristimulus(power)
@@ -63,22 +67,22 @@ def compare(power: Array, lines: bool = False) -> None:
         ("lin_rec709_scene", rec709(xyz)),
         ("lin_ap1_scene", acescg(xyz)),
     ):
-        found = abbe.spectrum.color(NM, power, space=space, lines=lines)
+        found = abbe.spectrum.color(NM, power, space=space)
         np.testing.assert_allclose(
-            found, wanted, rtol=0, atol=TOLERANCE * max(1.0, np.abs(wanted).max()), err_msg=space
+            found, wanted, rtol=0, atol=tolerance * max(1.0, np.abs(wanted).max()), err_msg=space
         )
 
 
 def test_white_is_one() -> None:
     for space in ("lin_rec709_scene", "lin_ap1_scene", "lin_rec2020_scene"):
         np.testing.assert_allclose(abbe.spectrum.color(NM, WHITE, space=space), 1, atol=1e-5)
-    np.testing.assert_allclose(rec709(tristimulus(WHITE)), 1, atol=1e-12)
+    np.testing.assert_allclose(rec709(tristimulus(WHITE)), 1, atol=1e-5)
 
 
 @pytest.mark.parametrize("name", ["A", "D50", "D55", "D65", "D75", "FL2", "FL7", "FL11", "E"])
 def test_standard_illuminants(name: str) -> None:
     ours = abbe.spectrum.illuminant(name, NM)
-    compare(ours)
+    compare(ours, STEEP if name == "FL11" else TOLERANCE)
     # The spectra themselves, where both have them.
     theirs = colour.SDS_ILLUMINANTS[name]
     inside = (theirs.shape.start <= NM) & (theirs.shape.end >= NM)
@@ -91,7 +95,7 @@ def test_standard_illuminants(name: str) -> None:
 @pytest.mark.parametrize("kelvin", [1000, 2856, 6500, 20000])
 def test_black_bodies(kelvin: float) -> None:
     power = abbe.spectrum.blackbody(kelvin, NM)
-    compare(power)
+    compare(power, STEEP if kelvin == 1000 else TOLERANCE)
     theirs = colour.sd_blackbody(kelvin, colour.SpectralShape(360, 830, 1))
     ours, wanted = tristimulus(power), tristimulus(theirs.values)
     np.testing.assert_allclose(ours / ours[1], wanted / wanted[1], atol=TOLERANCE)
@@ -124,7 +128,8 @@ def test_colours_become_reflectances_that_have_them() -> None:
         for exact in (True, False):
             spectrum = abbe.spectrum.reflectance(rgb, NM, exact=exact)
             assert ((spectrum >= 0) & (spectrum <= 1)).all()
-            np.testing.assert_allclose(rec709(tristimulus(spectrum * WHITE)), rgb, atol=1e-5)
+            # 1e-5, and the difference of sum and integral.
+            np.testing.assert_allclose(rec709(tristimulus(spectrum * WHITE)), rgb, atol=3e-5)
 
 
 def test_what_is_no_spectrum_is_refused() -> None:
