@@ -315,10 +315,10 @@ impl Parser<'_> {
     fn atom(&mut self) -> Result<Atom, String> {
         let anything = Atom { kinds: kind::ANY, scatter: 0, label: None };
         if self.take('<') {
-            let kinds = self.set(|c| kinds_of(c), kind::ANY)?;
+            let kinds = self.set(kinds_of, kind::ANY)?;
             let scatter = match self.peek() {
                 Some('>') => 0,
-                _ => self.set(|c| scatter_of(c), 0)?,
+                _ => self.set(scatter_of, 0)?,
             };
             let label = match self.peek() {
                 Some('>') => None,

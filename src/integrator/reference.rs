@@ -94,7 +94,7 @@ impl Worker for BruteForce<'_> {
         for index in range {
             let ray = task.camera.ray(&task.sampler.sample(pixel, index));
             let mut numbers = task.sampler.independent(pixel, index);
-            let [u, ..] = numbers.next();
+            let [u, ..] = numbers.draw();
             let wavelengths = visible::uniform(u.into());
             self.media.restart(wavelengths);
             let mut walk = Walk::new(&self.prepared.follower, &ray);
@@ -148,7 +148,7 @@ impl<'a> BruteForce<'a> {
             let far_medium = far.as_ref().map_or(medium, |far| self.media.of(far.medium));
             let interface = Interface { ior_i: medium.iors, ior_t: far_medium.iors };
             let at = surface::at(task.view, &ray, &met, wavelengths, interface);
-            let [u_there, u_light, u_x, u_y] = numbers.next();
+            let [u_there, u_light, u_x, u_y] = numbers.draw();
             if walk.crossings > MAX_CROSSINGS {
                 return (radiance, alpha);
             }
@@ -186,7 +186,7 @@ impl<'a> BruteForce<'a> {
                     radiance += throughput * value;
                 }
             }
-            let [u_lobe, u, v, u_roulette] = numbers.next();
+            let [u_lobe, u, v, u_roulette] = numbers.draw();
             let Some(sample) = bsdf.sample(wo, u_lobe, [u, v]) else { return (radiance, 1.0) };
             throughput *= sample.weight.hero();
             let (direction, passes) = match sample.scattered {

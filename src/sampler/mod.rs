@@ -56,7 +56,7 @@ impl PathSampler {
 
     /// Four numbers in 0..1, the next of the path.
     #[inline]
-    pub fn next(&mut self) -> [f32; 4] {
+    pub fn draw(&mut self) -> [f32; 4] {
         let group = self.group;
         self.group += 1;
         if group < GROUPS {
@@ -222,7 +222,7 @@ mod tests {
         assert_eq!(counts, [16; 4]);
         let mut path = sampler.path([3, 4], BLOCK + 5);
         assert_ne!(path.wavelength(), sampler.path([3, 4], 5).wavelength());
-        assert_ne!(path.next(), sampler.path([3, 4], 5).next());
+        assert_ne!(path.draw(), sampler.path([3, 4], 5).draw());
     }
 
     #[test]

@@ -123,7 +123,7 @@ impl Store {
     }
 
     /// The budget, bytes; 0 for the default.
-    pub fn budget_set(&self) -> u64 {
+    pub fn stated_budget(&self) -> u64 {
         self.budget.load(Ordering::Relaxed)
     }
 

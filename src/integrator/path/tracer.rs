@@ -298,12 +298,12 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             far: far.as_ref().map(|far| far.medium),
         };
         if !surface.bsdf.is_smooth() && !lighting.is_empty() {
-            let [u_light, u, v, _] = numbers.next();
+            let [u_light, u, v, _] = numbers.draw();
             if let Some(light) = lighting.sample(&surface.receiver, &state.wavelengths, u_light, [u, v]) {
                 self.add_direct(walk, &surface, &light, state, numbers);
             }
         }
-        let [u_lobe, u, v, u_roulette] = numbers.next();
+        let [u_lobe, u, v, u_roulette] = numbers.draw();
         let Some(sample) = surface.bsdf.sample(surface.wo, u_lobe, [u, v]) else { return false };
         state.depth = state.depth.after(sample.event);
         if !state.depth.is_within(&limits) {

@@ -34,7 +34,7 @@ impl LightImages {
 fn read(scene: &Scene, lights: &[Light], diagnostics: &mut Diagnostics) -> Result<(Vec<Option<Lookup>>, Store)> {
     let document = scene.document();
     let mut store = Store::default();
-    store.set_budget(scene.textures.budget_set());
+    store.set_budget(scene.textures.stated_budget());
     let mut lookups: Vec<Option<Lookup>> = vec![None; document.textures.len()];
     for light in lights {
         let (index, is_round) = match &light.shape {
