@@ -20,8 +20,8 @@ use crate::math::piecewise::{Knot, PiecewiseLinear};
 const EVEN: f64 = 0.05;
 /// Share of the density that goes to lights with lines, if there are any.
 const LINES: f64 = 0.5;
-/// A light is one with lines if its brightness at a wavelength, seen by the eye, has a mean square of so many squared means. Daylights have
-/// 1.0, black bodies less than 1.1, white LEDs and fluorescent lamps up to 3.
+/// A light is one with lines if its brightness at a wavelength, seen by the eye, has a mean square of so many squared means; daylight has
+/// less than 1.1.
 const PEAKED: f64 = 2.0;
 /// A density of wavelengths on 360–830 nm, positive everywhere.
 #[derive(Clone, Debug)]
