@@ -29,7 +29,7 @@ PACKAGE_SOURCES := pyproject.toml $(wildcard README.md LICENSE-*) \
 
 help:
 	@echo 'make build   the package with everything, in .venv'
-	@echo 'make demo    build, install into .venv, render stages/prism.usda to $(OUT)/, check it, write a preview'
+	@echo 'make demo    build, install into .venv, render stages to $(OUT)/, check them, write previews'
 	@echo 'make test    every test: Rust, documentation, Python, the wheel in an empty environment'
 	@echo 'make test-oldest-usd   tests of everything that meets USD, with the oldest version promised'
 	@echo 'make lint    formatting, clippy, rustdoc, ruff, mypy'
@@ -69,7 +69,10 @@ demo: $(EXTENSION)
 	@mkdir -p $(OUT)
 	$(BIN)/abbe render stages/prism.usda $(OUT)/prism.exr --preview $(OUT)/prism.png
 	$(BIN)/abbe check $(OUT)/prism.exr
-	@echo 'Look at $(OUT)/prism.png; $(OUT)/prism.exr has every layer.'
+	$(BIN)/abbe render stages/ball.usda $(OUT)/ball.exr --integrator path --aov color --aov dispersion --width 480 --samples 64 \
+	  --preview $(OUT)/ball.png
+	$(BIN)/abbe check $(OUT)/ball.exr
+	@echo 'Look at $(OUT)/prism.png and $(OUT)/ball.png; the EXRs beside them have every layer.'
 
 test: test-rust test-python test-oldest-usd
 
