@@ -237,7 +237,10 @@ fn requests_are_checked() {
     };
     says(request(0, 10, &["depth"]), "--width", "0");
     says(request(10, 10, &["depht"]), "--aov depht", "abbe aovs");
-    says(request(10, 10, &["color"]), "--aov color", "has no 'color'");
+    let without_light = Request { integrator: Some("differentials".into()), ..request(10, 10, &["color"]) };
+    says(without_light, "--aov color", "has no 'color'");
+    says(request(10, 10, &["lpe:CXL"]), "--aov lpe:CXL", "'X' at place 2");
+    says(request(10, 10, &["light_group:"]), "--aov light_group:", "names no light group");
     says(Request { integrator: Some("path".into()), ..Request::default() }, "integrator 'path'", "differentials");
     says(Request { camera: Some("/No".into()), ..Request::default() }, "--camera /No", "/World/Camera");
     says(Request { product: Some("/No".into()), ..Request::default() }, "--product /No", "none");

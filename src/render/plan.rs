@@ -347,11 +347,11 @@ fn reasons(
     if needs.chain {
         note(true, "specular chain", format!("{} about it", list(&chain_asked, "tells", "tell")));
     } else {
-        note(
-            false,
-            "specular chain",
-            format!("{} about the first surface only", list(&asked(&[FirstSurface]), "tells", "tell")),
-        );
+        let why = match &asked(&[FirstSurface])[..] {
+            [] => "no AOV asks for it".to_owned(),
+            names => format!("{} about the first surface only", list(names, "tells", "tell")),
+        };
+        note(false, "specular chain", why);
     }
     let asks = layers.iter().any(|layer| layer.aov.name == INTERNAL_TRANSMITTANCE);
     let why = match (asks, absorbing) {
