@@ -2,12 +2,12 @@
 
     python benches/mitsuba.py [--width 160] [--dispersion]
 
-Every scene is made for both from one description. Without dispersion both render the same light: their means are compared, and the
-error of each against a long render of its own. With `--dispersion`, where Mitsuba has none, its users render one image per
-wavelength and sum them: 32 of them here, each a sharp wavelength through glass of its own index.
+Every scene is made for both from one description. Without dispersion both render the same light: their means are
+compared, and the error of each against a long render of ours. With `--dispersion`, where Mitsuba has none, its users
+render one image per wavelength and sum them: 32 of them here, each a sharp wavelength through glass of its own index.
 
-relMSE = mean((x − ref)² / (ref² + 1e-2)) of linear RGB; t(1e-2) = seconds × relMSE / 1e-2. Compilation is not counted: Mitsuba
-renders once before the clock runs. Times are of one process after the other on an otherwise idle machine.
+relMSE = mean((x − ref)² / (ref² + 1e-2)) of linear RGB; t(1e-2) = seconds × relMSE / 1e-2. Compilation is not counted:
+Mitsuba renders once before the clock runs. Times are of one process after the other on an otherwise idle machine.
 """
 
 from __future__ import annotations
@@ -42,9 +42,11 @@ def room():
 
 def brilliant(sides=16):
     """A cut stone: table, crown, girdle, pavilion, with flat facets."""
-    ring = lambda r, y, turn=0.0: [
-        (r * np.cos(2 * np.pi * (i + turn) / sides), y, r * np.sin(2 * np.pi * (i + turn) / sides)) for i in range(sides)
-    ]
+
+    def ring(radius, y, turn=0.0):
+        angles = 2 * np.pi * (np.arange(sides) + turn) / sides
+        return [(radius * np.cos(angle), y, radius * np.sin(angle)) for angle in angles]
+
     points = [*ring(0.55, 1.75), *ring(1.0, 1.45, 0.5), *ring(1.0, 1.40, 0.5), (0, 0.55, 0), (0, 1.75, 0)]
     faces = []
     for i in range(sides):
@@ -110,11 +112,14 @@ def usd(name, glass_law):
 """)
     dome = f'    def DomeLight "Dome" {{ float inputs:intensity = {scene["dome"]} }}\n' if scene["dome"] else ""
     cx, cy, cz = LAMP["centre"]
+    newline = "\n            "
+    grey = [f"color3f inputs:base_color = ({WALL}, {WALL}, {WALL})", "float inputs:specular_weight = 0"]
+    clear = ["float inputs:transmission_weight = 1", "float inputs:specular_roughness = 0"]
     return f"""#usda 1.0
 (defaultPrim = "World" upAxis = "Y" metersPerUnit = 1)
 def Xform "World" {{
-{"".join(objects)}{surface("Grey", f"color3f inputs:base_color = ({WALL}, {WALL}, {WALL})" + chr(10) + "            float inputs:specular_weight = 0")}
-{surface("Glass", "float inputs:transmission_weight = 1" + chr(10) + "            float inputs:specular_roughness = 0", glass_law)}
+{"".join(objects)}{surface("Grey", newline.join(grey))}
+{surface("Glass", newline.join(clear), glass_law)}
 {dome}    def RectLight "Lamp" {{
         float inputs:intensity = {LAMP["radiance"]}
         float inputs:width = {LAMP["size"][0]}
@@ -163,7 +168,8 @@ def mitsuba_scene(mi, name, ior, width, integrator="path"):
         "integrator": {"type": integrator, "max_depth": -1, "rr_depth": 5},
         "lamp": {
             "type": "rectangle",
-            "to_world": to_world().translate([cx, cy, cz]) @ to_world().rotate([1, 0, 0], 90)
+            "to_world": to_world().translate([cx, cy, cz])
+            @ to_world().rotate([1, 0, 0], 90)
             @ to_world().scale([LAMP["size"][0] / 2, LAMP["size"][1] / 2, 1]),
             "emitter": {"type": "area", "radiance": light},
         },
@@ -207,8 +213,16 @@ def with_abbe(path, width, samples, seed=0):
     import abbe
 
     begin = time.perf_counter()
-    film = abbe.render(path, width=width, samples=samples, seed=seed, integrator="path", aovs=["color"],
-                       pixel_filter="box", pixel_filter_width=1.0)
+    film = abbe.render(
+        path,
+        width=width,
+        samples=samples,
+        seed=seed,
+        integrator="path",
+        aovs=["color"],
+        pixel_filter="box",
+        pixel_filter_width=1.0,
+    )
     return np.array(film["color"][..., :3], np.float64), time.perf_counter() - begin
 
 
@@ -252,7 +266,8 @@ def main():
             error = rel_mse(image, reference)
             line(name, f"mitsuba {variant}", options.samples, seconds, error, width * height * options.samples)
             print(f"{'':8} mean of abbe / mean of mitsuba: {mean.round(4)}")
-    print(f"peak memory of this process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:.0f} MB", file=sys.stderr)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+    print(f"peak memory of this process {peak:.0f} MB", file=sys.stderr)
 
 
 def mono(mi, name, variant, options, reference):
@@ -274,8 +289,14 @@ def mono(mi, name, variant, options, reference):
         total += image[..., :1] * responses[i]
         seconds += took
     total *= reference.mean((0, 1)) / total.mean((0, 1))
-    line(name, f"mitsuba {mi.variant()}, {count} × mono", samples * count, seconds, rel_mse(total, reference),
-         width * height * samples * count)
+    line(
+        name,
+        f"mitsuba {mi.variant()}, {count} × mono",
+        samples * count,
+        seconds,
+        rel_mse(total, reference),
+        width * height * samples * count,
+    )
 
 
 def abbe_response(low, high):
