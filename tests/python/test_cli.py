@@ -233,7 +233,7 @@ BAD_OPTIONS = [
     (("--width", "0"), 2, "--width"),
     (("--width", "x"), 2, "--width"),
     (("--aov", "nonsense"), 2, "--aov nonsense"),
-    (("--aov", "color"), 2, "--aov color"),
+    (("--integrator", "differentials", "--aov", "color"), 2, "--aov color"),
     (("--integrator", "nonsense"), 2, "integrator 'nonsense'"),
     (("--samples", "0"), 2, "--samples"),
     (("--crop", "5,5,5,9"), 2, "--crop"),
@@ -363,7 +363,7 @@ def test_aovs_are_listed(run: Run) -> None:
     names = [row["name"] for row in listing["aovs"]]
     assert "dispersion" in names
     depth = next(row for row in listing["aovs"] if row["name"] == "depth")
-    assert "cameraDepth" in depth["aliases"] and depth["integrators"] == ["differentials"]
+    assert "cameraDepth" in depth["aliases"] and depth["integrators"] == ["differentials", "path"]
     text = run("aovs").stdout
     assert all(name in text for name in names)
 

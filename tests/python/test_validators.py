@@ -403,7 +403,7 @@ def test_render_vars_without_a_known_source(stage: Callable[..., Path]) -> None:
     [
         ("int abbe:samples = -1", "error", "/Settings.abbe:samples", "-1"),
         ('token abbe:integrator = "paht"', "error", "/Settings", "paht"),
-        ("double abbe:errorTarget = 0.1", "warning", "/Settings.abbe:errorTarget", "0.1"),
+        ("double abbe:errorTarget = 0.1", "warning", "/Settings.abbe:errorTarget", "color, which is not rendered"),
         ("rel camera = </World/Cube>", "error", "/Settings.camera", "not a Camera"),
     ],
 )
