@@ -240,8 +240,8 @@ fn requests_are_checked() {
     let without_light = Request { integrator: Some("differentials".into()), ..request(10, 10, &["color"]) };
     says(without_light, "--aov color", "has no 'color'");
     says(request(10, 10, &["lpe:CXL"]), "--aov lpe:CXL", "'X' at place 2");
-    says(request(10, 10, &["light_group:"]), "--aov light_group:", "names no light group");
-    says(Request { integrator: Some("path".into()), ..Request::default() }, "integrator 'path'", "differentials");
+    says(request(10, 10, &["light_group:"]), "--aov light_group:", "needs an argument");
+    says(Request { integrator: Some("paht".into()), ..Request::default() }, "integrator 'paht'", "differentials, path");
     says(Request { camera: Some("/No".into()), ..Request::default() }, "--camera /No", "/World/Camera");
     says(Request { product: Some("/No".into()), ..Request::default() }, "--product /No", "none");
     says(Request { wavelength: Some(0.55), ..Request::default() }, "--wavelength", "micrometres");

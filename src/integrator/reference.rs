@@ -115,7 +115,8 @@ impl<'a> BruteForce<'a> {
     /// Radiance per nm along the walk, and whether there is a surface.
     fn follow(&mut self, walk: &mut Walk<'a>, wavelengths: &Wavelengths<1>, numbers: &mut PathSampler) -> (f32, f64) {
         let Prepared { task, lighting, .. } = self.prepared;
-        let (mut radiance, mut throughput, mut vertices) = (0.0, 1.0, 0);
+        // The last is the squared index of the medium over that of the first.
+        let (mut radiance, mut throughput, mut vertices, mut squeezed) = (0.0, 1.0, 0, 1.0);
         // The object of the last event, which only its own lights reach.
         let mut object = None;
         loop {
@@ -209,8 +210,12 @@ impl<'a> BruteForce<'a> {
                 }
                 Scattered::Straight => (ray.direction, true),
             };
+            if passes && far.is_some() {
+                let ratio = (far_medium.ior / medium.ior) as f32;
+                squeezed *= ratio * ratio;
+            }
             if vertices >= ROULETTE_FROM {
-                let probability = throughput.min(0.95);
+                let probability = (throughput * squeezed).min(0.95);
                 if u_roulette >= probability {
                     return (radiance, 1.0);
                 }

@@ -32,7 +32,8 @@ use crate::spectrum::{SampledSpectrum, Wavelengths, visible};
 /// From this vertex on roulette may end a path.
 const ROULETTE_FROM: u32 = 4;
 
-/// A path survives a roulette with at most this probability: all paths end.
+/// From this vertex on a path survives with at most this probability, however much it carries: all paths end.
+const ENDING_FROM: u32 = 64;
 const MOST_LIKELY: f32 = 0.97;
 
 /// What all paths of a render have in common.
@@ -76,6 +77,8 @@ struct State<const N: usize> {
     /// Since the camera light was only let through.
     sees_through: bool,
     alpha: f32,
+    /// Squared index of the medium over that of the first: what refraction has taken from β without taking light, and gives back.
+    squeezed: f32,
 }
 
 impl<const N: usize> State<N> {
@@ -139,6 +142,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             depth: Depth::default(),
             sees_through: true,
             alpha: 0.0,
+            squeezed: 1.0,
         };
         loop {
             let met = walk.advance(&mut self.counters);
@@ -358,6 +362,10 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         if self.ledger.is_divided() {
             self.ledger.scatter(&ways(&sample, passes));
         }
+        if passes && far.is_some() {
+            let ratio = (far_medium.ior / medium.ior) as f32;
+            state.squeezed *= ratio * ratio;
+        }
         state.sees_through &= passes && sample.event != bsdf::Event::Diffuse;
         match (sample.scattered, far) {
             (Scattered::Straight, _) | (_, None) if passes => walk.cross(met),
@@ -373,14 +381,15 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     /// Roulette: a path goes on with the probability of what it still carries.
     fn survives(&self, state: &mut State<N>, u: f32) -> bool {
         // As a mean over the lanes: that is what the pixel gets.
-        let carried = state.carried::<DISPERSIVE>().mean();
+        let carried = state.carried::<DISPERSIVE>().mean() * state.squeezed;
         if !(carried > 0.0 && carried.is_finite()) {
             return false;
         }
         if state.depth.total() < ROULETTE_FROM {
             return true;
         }
-        let probability = carried.min(MOST_LIKELY);
+        let most = if state.depth.total() < ENDING_FROM { 1.0 } else { MOST_LIKELY };
+        let probability = carried.min(most);
         if u >= probability {
             return false;
         }
