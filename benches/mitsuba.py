@@ -110,17 +110,25 @@ def usd(name, glass_law):
         rel material:binding = </World/Glass>
     }
 """)
-    dome = f'    def DomeLight "Dome" {{ float inputs:intensity = {scene["dome"]} }}\n' if scene["dome"] else ""
+    dome = f"""    def DomeLight "Dome"
+    {{
+        float inputs:intensity = {scene["dome"]}
+    }}
+"""
     cx, cy, cz = LAMP["centre"]
     newline = "\n            "
     grey = [f"color3f inputs:base_color = ({WALL}, {WALL}, {WALL})", "float inputs:specular_weight = 0"]
     clear = ["float inputs:transmission_weight = 1", "float inputs:specular_roughness = 0"]
     return f"""#usda 1.0
-(defaultPrim = "World" upAxis = "Y" metersPerUnit = 1)
+(
+    defaultPrim = "World"
+    metersPerUnit = 1
+    upAxis = "Y"
+)
 def Xform "World" {{
 {"".join(objects)}{surface("Grey", newline.join(grey))}
 {surface("Glass", newline.join(clear), glass_law)}
-{dome}    def RectLight "Lamp" {{
+{dome if scene["dome"] else ""}    def RectLight "Lamp" {{
         float inputs:intensity = {LAMP["radiance"]}
         float inputs:width = {LAMP["size"][0]}
         float inputs:height = {LAMP["size"][1]}
@@ -209,12 +217,9 @@ def line(name, who, spp, seconds, error, paths):
     )
 
 
-def with_abbe(path, width, samples, seed=0):
-    import abbe
-
+def with_abbe(scene, width, samples, seed=0):
     begin = time.perf_counter()
-    film = abbe.render(
-        path,
+    film = scene.render(
         width=width,
         samples=samples,
         seed=seed,
@@ -243,6 +248,8 @@ def main():
     options = parser.parse_args()
     import mitsuba as mi
 
+    import abbe
+
     width, height = options.width, options.width * 3 // 4
     law = 'uniform string abbe:glass = "SCHOTT:SF11"' if options.dispersion else "double abbe:dispersion:nd = 1.5"
     for name in options.scenes:
@@ -251,8 +258,9 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             stage = Path(folder) / f"{name}.usda"
             stage.write_text(usd(name, law))
-            reference, _ = with_abbe(str(stage), width, options.reference, seed=1)
-            image, seconds = with_abbe(str(stage), width, options.samples)
+            ours = abbe.Scene.from_stage(str(stage))
+        reference, _ = with_abbe(ours, width, options.reference, seed=1)
+        image, seconds = with_abbe(ours, width, options.samples)
         line(name, "abbe path", options.samples, seconds, rel_mse(image, reference), width * height * options.samples)
         for variant in options.variants:
             mi.set_variant(variant)
