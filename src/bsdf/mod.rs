@@ -127,10 +127,16 @@ enum Kind<const N: usize> {
 impl<const N: usize> Bsdf<N> {
     /// Of what the surface is made of there.
     pub fn new(parameters: &Parameters<N>) -> Self {
-        let bare = parameters.coat.is_none() && parameters.sheen.is_none();
+        let bare = parameters.coat.is_none_or(|coat| coat.weight <= 0.0)
+            && parameters.sheen.is_none_or(|sheen| sheen.weight <= 0.0);
         let opaque = parameters.metalness <= 0.0 && parameters.transmission <= 0.0;
+        // Equal media have no interface between them.
+        let is_matched = parameters.interface.ior_i == parameters.interface.ior_t
+            && parameters.schlick_f0.is_none()
+            && parameters.film.is_none();
+        let has_interface = parameters.specular_weight > 0.0 && !is_matched;
         // Returned from where they are made: moving a BSDF costs more than making a short one.
-        if bare && opaque && parameters.specular_weight <= 0.0 && parameters.diffuse_transmission.is_black() {
+        if bare && opaque && !has_interface && parameters.diffuse_transmission.is_black() {
             return Self { kind: Kind::Diffuse(Diffuse::new(parameters.base_color, parameters.diffuse_roughness)) };
         }
         let smooth = parameters.alpha[0].max(parameters.alpha[1]) < SMOOTH_ALPHA;
