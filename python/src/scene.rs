@@ -213,7 +213,7 @@ type Show<'a> = dyn Fn(Python<'_>, Film, Metadata) -> PyResult<()> + Sync + 'a;
 enum Message {
     /// A pass has ended; the thread waits for an answer.
     Passed(Box<(Film, Metadata)>),
-    Ended(Outcome<Rendered>),
+    Ended(Box<Outcome<Rendered>>),
 }
 
 /// Renders on a thread of its own while this one asks (with the interpreter) whether to go on.
@@ -248,12 +248,12 @@ fn watch(
                 Err(panic) => Err(defect(panic.as_ref())),
             };
             // The other end waits until this arrives.
-            let _ = send.send(Message::Ended(outcome));
+            let _ = send.send(Message::Ended(Box::new(outcome)));
         });
         let mut raised = None;
         let outcome = loop {
             match receive.recv_timeout(POLL) {
-                Ok(Message::Ended(outcome)) => break outcome,
+                Ok(Message::Ended(outcome)) => break *outcome,
                 Ok(Message::Passed(pass)) => {
                     let (film, metadata) = *pass;
                     let shown = Python::attach(|py| {
