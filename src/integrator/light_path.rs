@@ -100,7 +100,7 @@ struct Atom {
 /// A compiled expression.
 #[derive(Clone, Debug)]
 pub struct Expression {
-    /// Symbol and next state of each state; no symbol: the state only has [`empty`](Self::empty) moves.
+    /// Symbol and next state of each state; no symbol: the state is only left without an event.
     moves: Vec<Option<(Symbol, usize)>>,
     /// States reached from each state without an event, itself included.
     closures: Vec<u128>,

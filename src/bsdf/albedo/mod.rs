@@ -9,7 +9,7 @@
 //! - `leaving`: H(μ) = ∫ T(μ_i) G2 D/(4 μ) dω_i = Σ_j leaving_j T(μ_j), at F = 1
 //!
 //! A dielectric of one index, seen from the rarer side, has its E tabulated; so have rough dielectrics of either side what they lose
-//! of what they reflect and transmit, and sheen its albedo. All these integrals come from [`integrate`], which only tests
+//! of what they reflect and transmit, and sheen its albedo. All these integrals come from `integrate`, which only tests
 //! compile: it wrote `tables.bin`, and a test holds the one to the other. (Scheme of C. Kulla & A. Conty, "Revisiting physically
 //! based shading at Imageworks", SIGGRAPH 2017 course.)
 
