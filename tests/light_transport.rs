@@ -14,27 +14,9 @@ use glam::{DMat4, DVec3};
 use serde_json::json;
 use support::{BK7, SF11, Stagehand, authored, rendered, request};
 
-/// A white light of luminance 1.
+/// A white light of intensity 1 with a place of its own.
 fn light(path: &str, shape: LightShape, transform: DMat4) -> Light {
-    Light {
-        path: path.into(),
-        shape,
-        transform: Some(transform.to_cols_array()),
-        intensity: 1.0,
-        exposure: 0.0,
-        normalize: false,
-        color: [1.0; 3],
-        enable_color_temperature: false,
-        color_temperature: 6500.0,
-        diffuse: 1.0,
-        specular: 1.0,
-        shaping: None,
-        shadow: None,
-        light_link: None,
-        shadow_link: None,
-        abbe: Default::default(),
-        physical: Default::default(),
-    }
+    Light { transform: Some(transform.to_cols_array()), ..support::light(path, shape) }
 }
 
 fn dome() -> LightShape {

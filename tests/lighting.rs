@@ -18,27 +18,9 @@ use support::{Stagehand, authored};
 /// Render space's zero: somewhere.
 const ORIGIN: DVec3 = DVec3::new(0.25, -0.5, 1.5);
 
-/// A white light of intensity 1.
+/// A white light of intensity 1 with a place of its own.
 fn light(path: &str, shape: LightShape, transform: DMat4) -> description::Light {
-    description::Light {
-        path: path.into(),
-        shape,
-        transform: Some(transform.to_cols_array()),
-        intensity: 1.0,
-        exposure: 0.0,
-        normalize: false,
-        color: [1.0; 3],
-        enable_color_temperature: false,
-        color_temperature: 6500.0,
-        diffuse: 1.0,
-        specular: 1.0,
-        shaping: None,
-        shadow: None,
-        light_link: None,
-        shadow_link: None,
-        abbe: Default::default(),
-        physical: Default::default(),
-    }
+    description::Light { transform: Some(transform.to_cols_array()), ..support::light(path, shape) }
 }
 
 fn at(x: f64, y: f64, z: f64) -> DMat4 {

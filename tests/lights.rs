@@ -11,30 +11,7 @@ use abbe::scene::description::{
 };
 use abbe::scene::lights::Lights;
 use glam::{DMat4, DQuat, DVec3};
-use support::{Stagehand, ball};
-
-/// A white light of intensity 1.
-fn light(path: &str, shape: LightShape) -> description::Light {
-    description::Light {
-        path: path.into(),
-        shape,
-        transform: None,
-        intensity: 1.0,
-        exposure: 0.0,
-        normalize: false,
-        color: [1.0; 3],
-        enable_color_temperature: false,
-        color_temperature: 6500.0,
-        diffuse: 1.0,
-        specular: 1.0,
-        shaping: None,
-        shadow: None,
-        light_link: None,
-        shadow_link: None,
-        abbe: Default::default(),
-        physical: Default::default(),
-    }
-}
+use support::{Stagehand, ball, light};
 
 fn sphere(radius: f64) -> LightShape {
     LightShape::Sphere { radius, treat_as_point: false }

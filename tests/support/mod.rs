@@ -9,8 +9,8 @@ use abbe::integrator::Registry;
 use abbe::render::{Control, Plan, Rendered, Request, plan, render};
 use abbe::scene::Scene;
 use abbe::scene::description::{
-    Array, Arrays, Authored, Camera, Description, Document, Element, FORMAT, Group, Material, Mesh, Placement, Primvar,
-    Settings, Shader, Shape, Stage, Target, VERSION,
+    Array, Arrays, Authored, Camera, Description, Document, Element, FORMAT, Group, Light, LightShape, Material, Mesh,
+    Placement, Primvar, Settings, Shader, Shape, Stage, Target, VERSION,
 };
 use glam::{DMat4, DVec3};
 use serde_json::json;
@@ -240,6 +240,29 @@ impl Stagehand {
 
     pub fn build(self) -> Scene {
         Scene::build(self.description()).unwrap_or_else(|e| panic!("{e}"))
+    }
+}
+
+/// A white light of intensity 1, placed by its group.
+pub fn light(path: &str, shape: LightShape) -> Light {
+    Light {
+        path: path.into(),
+        shape,
+        transform: None,
+        intensity: 1.0,
+        exposure: 0.0,
+        normalize: false,
+        color: [1.0; 3],
+        enable_color_temperature: false,
+        color_temperature: 6500.0,
+        diffuse: 1.0,
+        specular: 1.0,
+        shaping: None,
+        shadow: None,
+        light_link: None,
+        shadow_link: None,
+        abbe: BTreeMap::new(),
+        physical: BTreeMap::new(),
     }
 }
 
