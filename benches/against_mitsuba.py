@@ -1,6 +1,6 @@
 """Side by side with Mitsuba 3 (`pip install mitsuba`): equal scenes, equal images, time to an error.
 
-    python benches/mitsuba.py [--width 160] [--dispersion]
+    python benches/against_mitsuba.py [--width 160] [--dispersion]
 
 Every scene is made for both from one description. Without dispersion both render the same light: their means are
 compared, and the error of each against a long render of ours. With `--dispersion`, where Mitsuba has none, its users
