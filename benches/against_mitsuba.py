@@ -284,7 +284,7 @@ def mono(mi, name, variant, options, reference):
     import abbe
 
     mi.set_variant("llvm_ad_mono" if variant.startswith("llvm") else "scalar_rgb")
-    glass = abbe.glass("SCHOTT:SF11")
+    glass = abbe.glass("SCHOTT:SF11", out_of_range="clamp")
     width, height, count = options.width, options.width * 3 // 4, 32
     edges = np.linspace(380, 720, count + 1)
     responses = [abbe_response(edges[i], edges[i + 1]) for i in range(count)]
