@@ -2,8 +2,8 @@
 
     python benches/against_mitsuba.py [--width 160]
 
-Every scene is made for both from one description, with glass of a constant index: both render the same light. Their means
-are compared, and the error of each against a long render of ours.
+Every scene is made for both from one description, with glass of a constant index: both render the same light. Their
+means are compared, and the error of each against a long render of ours.
 
 relMSE = mean((x − ref)² / (ref² + 1e-2)) of linear RGB; t(1e-2) = seconds × relMSE / 1e-2. Compilation is not counted:
 Mitsuba renders once before the clock runs. Times are of one process after the other on an otherwise idle machine.
