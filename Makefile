@@ -69,7 +69,7 @@ demo: $(EXTENSION)
 	@mkdir -p $(OUT)
 	$(BIN)/abbe render stages/prism.usda $(OUT)/prism.exr --preview $(OUT)/prism.png
 	$(BIN)/abbe check $(OUT)/prism.exr
-	$(BIN)/abbe render stages/ball.usda $(OUT)/ball.exr --integrator path --aov color --aov dispersion --width 480 --samples 64 \
+	$(BIN)/abbe render stages/ball.usda $(OUT)/ball.exr --integrator path --aov color --aov dispersion --width 320 --samples 64 \
 	  --preview $(OUT)/ball.png
 	$(BIN)/abbe check $(OUT)/ball.exr
 	@echo 'Look at $(OUT)/prism.png and $(OUT)/ball.png; the EXRs beside them have every layer.'
