@@ -429,6 +429,37 @@ fn what_loses_no_light_vanishes_in_a_furnace() {
     }
 }
 
+/// Half of it is there, and that is black: each of a ball's two surfaces lets half of the light pass by itself.
+fn half_there(s: &mut Stagehand) -> usize {
+    let inputs = [("base_color", color([0.0; 3])), ("specular_weight", number(0.0)), ("geometry_opacity", number(0.5))];
+    s.surface("/World/Half", "ND_open_pbr_surface_surfaceshader", &inputs, &[])
+}
+
+#[test]
+fn what_is_half_there_lets_half_pass_at_every_surface() {
+    let quarter = |found: f64, whole: f64| {
+        assert!((found / whole - 0.25).abs() < 5e-3, "{found} of {whole}");
+    };
+    // Seen.
+    let mut s = Stagehand::new();
+    let half = half_there(&mut s);
+    s.sphere("/World/Ball", 1.0, DMat4::IDENTITY, Some(half));
+    s.camera(DVec3::new(0.2, 0.3, 4.0), DVec3::ZERO);
+    s.document.cameras[0].focal_length = 500.0;
+    s.document.groups[0].lights = vec![light("/World/Dome", dome(), DMat4::IDENTITY)];
+    quarter(mean(&rendered(&s.build(), &color_request(4, 4, 4096, "path")).film).0[1], 1.0);
+    // In its shadow.
+    let mut s = Stagehand::new();
+    let white = lambert(&mut s, 0.5);
+    let half = half_there(&mut s);
+    s.wall(0.0, 50.0, Some(white));
+    s.sphere("/World/Ball", 0.5, at(0.0, 0.0, 2.0), Some(half));
+    s.camera(DVec3::new(3.0, 0.5, 6.0), DVec3::ZERO);
+    s.document.cameras[0].focal_length = 3.5e4;
+    s.document.groups[0].lights = vec![light("/World/Sun", LightShape::Distant { angle: 0.0 }, DMat4::IDENTITY)];
+    quarter(mean(&rendered(&s.build(), &color_request(4, 4, 4096, "path")).film).0[1], 0.5 / PI);
+}
+
 #[test]
 fn a_slab_absorbs_by_beer_and_lambert() {
     let mut s = Stagehand::new();

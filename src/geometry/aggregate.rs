@@ -533,8 +533,7 @@ impl Placed<'_> {
         })
     }
 
-    /// Whether a surface before `limit` is one that `blocks`. Of an analytic shape only the first surface is asked: all of
-    /// it has one material and no texture coordinates.
+    /// Whether a surface before `limit` is one that `blocks`.
     fn meets(
         &self,
         ray: &Ray,
@@ -546,7 +545,17 @@ impl Placed<'_> {
         let Shape::Mesh(mesh) = self.shape else {
             let mut nearest = Nearest { hit: None, limit };
             self.intersect(ray, instance, standing, &mut nearest);
-            return nearest.hit.is_some_and(|hit| blocks(&hit));
+            // Far from the start, what lies beyond the first surface needs no care for where the ray stands.
+            return nearest.hit.is_some_and(|first| {
+                let mut is_blocked = blocks(&first);
+                if !is_blocked {
+                    self.crossings(ray, instance, &mut |hit| {
+                        let is_beyond = hit.distance > first.distance && hit.distance < limit;
+                        is_blocked = is_blocked || is_beyond && blocks(hit);
+                    });
+                }
+                is_blocked
+            });
         };
         let object = self.ray(ray);
         let start = self.start(&object, instance, standing);

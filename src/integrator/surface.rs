@@ -44,11 +44,16 @@ pub(super) fn at<const N: usize>(
     }
 }
 
+/// Tells the crossings of one straight way apart: a ray enters and leaves a sphere by the same primitive.
+pub(super) fn crossing(hit: &Hit) -> u64 {
+    u64::from(hit.leaving) << 63 | u64::from(hit.instance) << 32 | u64::from(hit.primitive)
+}
+
 /// What a surface in the way of sampled light lets through; `None`: everything.
 ///
 /// `numbers` decides for each surface by itself whether a share of it is there.
 pub(super) fn through<const N: usize>(view: &View<'_>, hit: &Hit, numbers: &PathSampler) -> Option<SampledSpectrum<N>> {
     let share = view.share_present(hit, view.material_id(hit));
-    let is_there = share >= 1.0 || numbers.of(u64::from(hit.instance) << 32 | u64::from(hit.primitive)) < share;
+    let is_there = share >= 1.0 || numbers.of(crossing(hit)) < share;
     is_there.then_some(SampledSpectrum::ZERO)
 }

@@ -251,8 +251,8 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         let far_medium = far.as_ref().map_or(medium, |far| self.media.of(far.medium));
         let interface = Interface { ior_i: medium.iors, ior_t: far_medium.iors };
         let at = surface::at(view, &walk.ray, met, &state.wavelengths, interface);
-        let way = u64::from(met.hit.instance) << 32 | u64::from(met.hit.primitive);
-        if at.presence < 1.0 && (at.presence <= 0.0 || numbers.of(way) >= at.presence) {
+        let is_there = at.presence >= 1.0 || numbers.of(surface::crossing(&met.hit)) < at.presence;
+        if !is_there {
             walk.cross(met);
             return true;
         }
