@@ -519,6 +519,15 @@ fn parts_sum_to_the_whole() {
             assert_eq!(of("all"), *whole, "pixel {pixel}");
         }
     }
+    let request = Request { aovs: Some(vec!["light_group:lamp".into(), "dome=lpe:C.*B".into()]), ..request };
+    let by_light = rendered(&scene, &request).film;
+    for (pixel, whole) in whole.chunks_exact(4).enumerate() {
+        for (i, whole) in whole[..3].iter().enumerate() {
+            let [lamp, dome] = ["light_group_lamp", "dome"].map(|layer| values(&by_light, layer)[3 * pixel + i]);
+            let size = lamp.abs() + dome.abs() + whole.abs();
+            assert!((lamp + dome - whole).abs() <= 2e-6 * size + 1e-6, "pixel {pixel}: {lamp} + {dome} of {whole}");
+        }
+    }
     let total = |layer: &str| values(&film, layer).iter().sum::<f32>();
     assert!(total("glass") > 0.0 && total("glass") <= total("transmission"));
 }
@@ -558,6 +567,33 @@ fn nothing_but_the_scene_decides_a_bit() {
         values(&rendered(&scene, &others).film, "dispersion"),
         values(&rendered(&scene, &boxed).film, "dispersion")
     );
+}
+
+#[test]
+fn a_plate_is_seen_through_glass_and_nowhere_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("plate.png");
+    // Bright on the right, dark on the left; sRGB 188 is 0.5029 in linear light.
+    let image = image::RgbImage::from_fn(30, 20, |x, _| image::Rgb([if x < 15 { 0 } else { 188 }; 3]));
+    image.save(&file).unwrap();
+    let mut s = Stagehand::new();
+    // Of index 1: what is seen through it stays where it is, and nothing is reflected.
+    let clear = s.constant_glass("/World/Clear", 1.0);
+    s.sphere("/World/Ball", 1.0, DMat4::IDENTITY, Some(clear));
+    s.camera(DVec3::new(0.0, 0.0, 6.0), DVec3::ZERO);
+    s.document.groups[0].lights = vec![light("/World/Dome", dome(), DMat4::IDENTITY)];
+    let plate = Some(file.to_str().unwrap().to_owned());
+    let film = rendered(&s.build(), &Request { plate, ..color_request(30, 20, 1024, "path") }).film;
+    let pixel = |x: usize, y: usize| &values(&film, "color")[4 * (30 * y + x)..][..4];
+    let [r, g, b, a] = pixel(17, 10) else { panic!("four channels") };
+    assert!([r, g, b].iter().all(|c| (**c - 0.5029).abs() < 5e-3) && *a == 1.0, "{:?}", pixel(17, 10));
+    assert!(pixel(12, 10)[..3].iter().all(|c| c.abs() < 1e-3), "{:?}", pixel(12, 10));
+    assert_eq!(pixel(1, 1), [0.0; 4]);
+    let missing = Request { plate: Some("/nowhere/plate.png".into()), ..color_request(4, 4, 1, "path") };
+    let plan = support::the_plan(&test_scene(), &missing);
+    let control = abbe::render::Control::none();
+    let error = abbe::render::render(&test_scene(), &plan, &abbe::integrator::Registry::default(), &control);
+    assert!(error.expect_err("there is no such file").to_string().contains("/nowhere/plate.png"));
 }
 
 #[test]
