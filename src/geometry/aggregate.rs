@@ -216,6 +216,11 @@ impl Aggregate {
         Some(self.extent_of(instance)?.bounds)
     }
 
+    /// Lower and upper bounds of an instance in render space at all times; `None` where it has no extent.
+    pub fn bounds_of_instance(&self, instance: u32) -> Option<[DVec3; 2]> {
+        self.bounds_of(instance).map(|Bounds { min, max }| [min, max])
+    }
+
     /// Whether an instance stands where it is and as it is at all times.
     pub(crate) fn stands_still(&self, instance: u32) -> bool {
         let deforms = matches!(self.shape(instance), Shape::Mesh(mesh) if mesh.is_deforming());

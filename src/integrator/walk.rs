@@ -34,6 +34,7 @@ pub struct SurfacePoint {
 }
 
 /// A ray on its way, with the media around it.
+#[derive(Clone)]
 pub(super) struct Walk<'a> {
     pub(super) view: &'a View<'a>,
     pub(super) ray: Ray,
@@ -62,6 +63,22 @@ impl<'a> Walk<'a> {
             travelled: 0.0,
             crossings: 0,
             sight: follower.sight(start),
+            begin: 0.0,
+            begins_anew: false,
+            is_lost: false,
+        }
+    }
+
+    /// On `ray`, which no camera sent.
+    pub(super) fn anywhere(view: &'a View<'a>, ray: Ray) -> Self {
+        Self {
+            view,
+            ray,
+            media: view.media_at(ray.origin, ray.time),
+            departures: Departures::none(),
+            travelled: 0.0,
+            crossings: 0,
+            sight: None,
             begin: 0.0,
             begins_anew: false,
             is_lost: false,

@@ -71,6 +71,11 @@ impl PathSampler {
         })
     }
 
+    /// The numbers of a side path that begins here: independent of all others, stratified over the pixel's samples themselves.
+    pub fn branch(&self) -> Self {
+        Self { seed: hash(self.seed ^ hash(!u64::from(self.group))), ..*self }
+    }
+
     /// A number in 0..1 for something that has a number of its own on the way: independent of all others.
     pub fn of(&self, what: u64) -> f32 {
         let state = hash(self.seed ^ hash(what ^ (u64::from(self.index) << 32 | u64::from(self.group))));

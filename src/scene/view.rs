@@ -87,6 +87,17 @@ impl<'a> View<'a> {
         self.scene.objects.ids(object).material_ids.iter().any(has_interior)
     }
 
+    /// Objects whose surfaces may be smooth glass or mirrors, with their boxes at all times in render space.
+    pub fn focusing(&self) -> impl Iterator<Item = (u32, [DVec3; 2])> {
+        let is_smooth = |id: &u32| {
+            let material = id.checked_sub(1).map(|i| &self.scene.materials[i as usize]);
+            material.is_some_and(|m| matches!(m.kind, Kind::Dielectric { rough: false, .. } | Kind::Mirror { .. }))
+        };
+        let has_smooth = move |object: &u32| self.scene.objects.ids(*object).material_ids.iter().any(is_smooth);
+        let bounded = |object| Some((object, self.aggregate.bounds_of_instance(object)?));
+        (0..self.scene.objects.len()).filter(has_smooth).filter_map(bounded)
+    }
+
     /// Whether the surface at `hit` can coincide with another object's glass (cemented lenses, liquid in its glass).
     pub fn is_touching(&self, hit: &Hit) -> bool {
         self.touching[hit.instance as usize].or_find(|| {

@@ -7,6 +7,9 @@
 use crate::integrator::light_path::{Event, Expression, States};
 use crate::spectrum::SampledSpectrum;
 
+/// Where a path may be in an expression, and the share of its light that is there.
+pub(super) type Branches<const N: usize> = Vec<(States, SampledSpectrum<N>)>;
+
 /// Of one path after the other.
 #[derive(Debug)]
 pub(super) struct Ledger<'a, const N: usize> {
@@ -20,8 +23,7 @@ pub(super) struct Ledger<'a, const N: usize> {
 struct Part<'a, const N: usize> {
     expression: &'a Expression,
     sum: SampledSpectrum<N>,
-    /// Where the path may be in the expression, and the share of its light that is there.
-    branches: Vec<(States, SampledSpectrum<N>)>,
+    branches: Branches<N>,
 }
 
 impl<'a, const N: usize> Ledger<'a, N> {
@@ -67,6 +69,18 @@ impl<'a, const N: usize> Ledger<'a, N> {
                     }
                 }
             }
+        }
+    }
+
+    /// Where the path is in all expressions, to return to.
+    pub(super) fn branches(&self) -> Vec<Branches<N>> {
+        self.parts.iter().map(|part| part.branches.clone()).collect()
+    }
+
+    /// Goes back to where the path was.
+    pub(super) fn return_to(&mut self, branches: Vec<Branches<N>>) {
+        for (part, branches) in self.parts.iter_mut().zip(branches) {
+            part.branches = branches;
         }
     }
 

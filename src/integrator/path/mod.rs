@@ -6,8 +6,13 @@
 //! made the path. All other AOVs are those of `differentials`, in the same pass and with the same bits.
 
 mod depth;
+mod direct;
+mod guide;
+mod guided;
 mod ledger;
+mod photons;
 mod plate;
+mod state;
 mod tracer;
 
 use std::ops::Range;
@@ -29,6 +34,7 @@ use crate::spectrum::illuminant::Illuminant;
 use crate::spectrum::visible::Visible;
 use crate::spectrum::{LANES, Wavelength, sensor};
 pub use depth::DepthLimits;
+use guide::Guide;
 use plate::Plate;
 use tracer::{Setting, Tracer};
 
@@ -66,6 +72,8 @@ struct Prepared<'a> {
     /// Without any dispersion, if the clean beauty is asked for.
     clean: Option<Laws<'a>>,
     plate: Option<Plate>,
+    /// Where to look for light that is focused; `None` if none is.
+    guide: Option<Guide>,
     /// What wavelengths are drawn from.
     visible: Visible,
     /// Of the layers that show parts of the light, in the order of `parts`.
@@ -98,7 +106,7 @@ impl<'a> Prepared<'a> {
         }
         let plate = task.plate.map(|path| Plate::open(path, task.resolution)).transpose()?;
         let has_others = task.aovs.iter().any(|aov| aov.family != Family::Transport);
-        Ok(Self {
+        let mut prepared = Self {
             task,
             follower: Follower::of_camera(task.view, task.camera),
             visible: visible(&lighting),
@@ -106,11 +114,14 @@ impl<'a> Prepared<'a> {
             laws: Laws::new(scene, task.optics.dispersion_scale)?,
             clean: if clean_layers.is_empty() { None } else { Some(Laws::new(scene, 0.0)?) },
             plate,
+            guide: None,
             expressions,
             parts,
             clean_layers,
             others: if has_others { Some(Differentials::prepared(task)?) } else { None },
-        })
+        };
+        prepared.guide = photons::guide(prepared.setting(), task, &prepared.laws, &prepared.visible);
+        Ok(prepared)
     }
 
     fn setting(&self) -> Setting<'_> {
@@ -120,6 +131,7 @@ impl<'a> Prepared<'a> {
             follower: &self.follower,
             lighting: &self.lighting,
             plate: self.plate.as_ref(),
+            guide: self.guide.as_ref(),
             limits: self.task.depth_limits,
         }
     }

@@ -6,11 +6,13 @@
 //! rough interface disperses. A smooth dispersive refraction takes r of all companions to 0, since no other wavelength goes that way:
 //! the hero then counts N-fold by itself.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
-use super::depth::{Depth, DepthLimits};
+use super::depth::DepthLimits;
+use super::guide::Guide;
 use super::ledger::Ledger;
 use super::plate::Plate;
+use super::state::{Arrival, Look, Purpose, Scatterer, State, Vertex};
 use crate::bsdf::{self, Bsdf, Interface, Scattered};
 use crate::camera::Camera;
 use crate::geometry::Ray;
@@ -21,12 +23,10 @@ use crate::integrator::light_path::{self, Event, Expression};
 use crate::integrator::surface;
 use crate::integrator::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
 use crate::light::{Light, Shape};
-use crate::lighting::{LightHit, LightId, LightSample, Lighting, Receiver};
-use crate::optics::media::MediumId;
+use crate::lighting::{LightHit, LightId, Lighting, Receiver};
 use crate::ray::{RayStart, ScatterKind, mirror, refract_or_reflect};
 use crate::sampler::PathSampler;
 use crate::scene::view::View;
-use crate::spectrum::reflectance::Reflectance;
 use crate::spectrum::{SampledSpectrum, Wavelengths, visible};
 
 /// From this vertex on roulette may end a path.
@@ -36,6 +36,9 @@ const ROULETTE_FROM: u32 = 4;
 const ENDING_FROM: u32 = 64;
 const MOST_LIKELY: f32 = 0.97;
 
+/// Photons take each of the two ways on from smooth glass with at least this probability: they learn of faint light, too.
+const EXPLORED: f32 = 0.1;
+
 /// What all paths of a render have in common.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setting<'a> {
@@ -44,80 +47,24 @@ pub(super) struct Setting<'a> {
     pub(super) follower: &'a Follower<'a>,
     pub(super) lighting: &'a Lighting<'a>,
     pub(super) plate: Option<&'a Plate>,
+    pub(super) guide: Option<&'a Guide>,
     pub(super) limits: DepthLimits,
+}
+
+/// Whether a light shines on diffuse and specular materials differently from what it is.
+pub(super) fn has_factors(light: &Light) -> bool {
+    #[expect(clippy::float_cmp, reason = "1 is what nobody authored")]
+    let factors = light.diffuse != 1.0 || light.specular != 1.0;
+    factors
 }
 
 /// Traces paths on one thread.
 pub(super) struct Tracer<'a, const N: usize, const DISPERSIVE: bool> {
-    setting: Setting<'a>,
-    media: PathMedia<'a, N>,
+    pub(super) setting: Setting<'a>,
+    pub(super) media: PathMedia<'a, N>,
     /// Radiance per nm of the last path, and what it is divided into.
     pub(super) ledger: Ledger<'a, N>,
     pub(super) counters: Counters,
-}
-
-/// The last vertex that chose a direction by a density.
-struct Vertex<const N: usize> {
-    receiver: Receiver,
-    /// r before its event, over the density of the direction.
-    r_over_pdf: SampledSpectrum<N>,
-    /// The part of its weight that is diffuse.
-    diffuse_share: SampledSpectrum<N>,
-}
-
-/// What a path has come to.
-struct State<const N: usize> {
-    wavelengths: Wavelengths<N>,
-    throughput: SampledSpectrum<N>,
-    r: SampledSpectrum<N>,
-    vertex: Option<Vertex<N>>,
-    /// The object of the last event: only lights that are linked to it count.
-    object: Option<u32>,
-    depth: Depth,
-    /// Since the camera light was only let through.
-    sees_through: bool,
-    alpha: f32,
-    /// Squared index of the medium over that of the first: what refraction has taken from β without taking light, and gives back.
-    squeezed: f32,
-}
-
-impl<const N: usize> State<N> {
-    /// β / mean(r): what radiance from here counts.
-    fn carried<const DISPERSIVE: bool>(&self) -> SampledSpectrum<N> {
-        if DISPERSIVE { self.throughput * (1.0 / self.r.mean()) } else { self.throughput }
-    }
-
-    /// The path's light ends in what is no part of the picture: as much of the pixel stays open.
-    fn open<const DISPERSIVE: bool>(&mut self) {
-        if self.alpha > 0.0 {
-            self.alpha -= self.carried::<DISPERSIVE>().mean().clamp(0.0, 1.0);
-        }
-    }
-}
-
-/// A surface that scatters, where the path has met it.
-struct Scatterer<'s, const N: usize> {
-    met: &'s SurfacePoint,
-    /// Geometric normal on the side of the path.
-    n_g: DVec3,
-    frame: Frame,
-    wo: Vec3,
-    bsdf: Bsdf<N>,
-    receiver: Receiver,
-    /// The medium behind, where the surface bounds one.
-    far: Option<Option<MediumId>>,
-}
-
-/// Where what could block a light at `distance` ends: before its own surface, which is met with the error of many roundings.
-fn before(distance: f64) -> f64 {
-    distance * (1.0 - 1e-9)
-}
-
-/// Whether a light shines on diffuse and specular materials differently from what it is.
-fn has_factors(light: &Light) -> bool {
-    #[expect(clippy::float_cmp, reason = "1 is what nobody authored")]
-    let factors = light.diffuse != 1.0 || light.specular != 1.0;
-    factors
 }
 
 impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
@@ -131,35 +78,47 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     pub(super) fn trace(&mut self, start: &RayStart, wavelengths: Wavelengths<N>, numbers: &mut PathSampler) -> f32 {
         self.media.restart(wavelengths);
         self.ledger.restart();
-        let Setting { lighting, .. } = self.setting;
         let mut walk = Walk::new(self.setting.follower, start);
-        let mut state = State {
-            wavelengths,
-            throughput: SampledSpectrum::ONE,
-            r: SampledSpectrum::ONE,
-            vertex: None,
-            object: None,
-            depth: Depth::default(),
-            sees_through: true,
-            alpha: 0.0,
-            squeezed: 1.0,
-        };
+        let mut state = State::new(Purpose::Picture, wavelengths);
+        self.follow(&mut walk, &mut state, numbers);
+        state.alpha
+    }
+
+    /// Follows light from `ray` on to where it arrives by way of smooth surfaces alone; `None` if it meets another surface first, or gets lost.
+    pub(super) fn photon(
+        &mut self,
+        ray: Ray,
+        wavelengths: Wavelengths<N>,
+        numbers: &mut PathSampler,
+    ) -> Option<Arrival<N>> {
+        self.media.restart(wavelengths);
+        let mut walk = Walk::anywhere(self.setting.view, ray);
+        let mut state = State::new(Purpose::Photon, wavelengths);
+        self.follow(&mut walk, &mut state, numbers);
+        state.arrival
+    }
+
+    /// Follows a walk to its end.
+    pub(super) fn follow(&mut self, walk: &mut Walk<'a>, state: &mut State<N>, numbers: &mut PathSampler) {
+        let Setting { lighting, .. } = self.setting;
         loop {
             let met = walk.advance(&mut self.counters);
             let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
             let medium = self.media.of(walk.media.current());
             let ray = walk.ray;
-            lighting.along(&ray, limit, &wavelengths, &mut |mut light| {
-                if let Some(through) = medium.transmittance(light.distance) {
-                    light.radiance *= through;
-                }
-                self.meet(&state, ray.direction, &light);
-            });
+            if state.meets_lights() {
+                lighting.along(&ray, limit, &state.wavelengths, &mut |mut light| {
+                    if let Some(through) = medium.transmittance(light.distance) {
+                        light.radiance *= through;
+                    }
+                    self.meet(state, ray.direction, &light);
+                });
+            }
             let Some(met) = met else {
                 // What absorbs lets nothing through from infinitely far.
                 let absorbs = |sigma: &SampledSpectrum<N>| sigma.0.iter().any(|&sigma| sigma > 0.0);
-                if !medium.absorption.as_ref().is_some_and(absorbs) {
-                    self.leave(&mut state, &ray);
+                if state.meets_lights() && !medium.absorption.as_ref().is_some_and(absorbs) {
+                    self.leave(state, &ray);
                 }
                 break;
             };
@@ -171,11 +130,10 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 self.counters.exhausted += 1;
                 break;
             }
-            if !self.event(&mut walk, &met, &mut state, numbers) {
+            if !self.event(walk, &met, state, numbers) {
                 break;
             }
         }
-        state.alpha
     }
 
     /// The path meets nothing more.
@@ -204,9 +162,18 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             self.ledger.add(state.carried::<DISPERSIVE>() * met.radiance, emission);
             return;
         };
-        let pdf = lighting.pdf(&vertex.receiver, direction, met);
+        // By way of smooth surfaces the guide finds it, if anything does.
+        let is_direct = state.smooth_events == 0;
+        let pdf = match (self.setting.guide, vertex.look) {
+            _ if is_direct => lighting.pdf(&vertex.receiver, direction, met),
+            (Some(guide), Some(Look { region, probability })) => {
+                probability * guide.pdf(region, vertex.receiver.point, vertex.direction)
+            }
+            _ => 0.0,
+        };
         let mut seen = met.radiance;
         if let Some(light) = lighting.light(met.light)
+            && is_direct
             && has_factors(light)
         {
             let specular = SampledSpectrum::splat(light.specular as f32);
@@ -221,7 +188,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     }
 
     /// What a light is to expressions.
-    fn emission(&self, id: LightId) -> Event {
+    pub(super) fn emission(&self, id: LightId) -> Event {
         if !self.ledger.is_divided() {
             return Event::emission(light_path::Source::Light, None);
         }
@@ -243,7 +210,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         state: &mut State<N>,
         numbers: &mut PathSampler,
     ) -> bool {
-        let Setting { view, lighting, limits, .. } = self.setting;
+        let Setting { view, lighting, limits, guide, .. } = self.setting;
         let inside = view.inside(&met.hit, met.material_id);
         let medium = self.media.of(walk.media.current());
         // What lies behind: another medium only where the surface bounds one.
@@ -269,7 +236,9 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             state.alpha = 1.0;
         }
         let direction = walk.ray.direction;
-        if let Some(emitted) = lighting.emitted(&walk.ray, &met.hit, &state.wavelengths) {
+        if state.meets_lights()
+            && let Some(emitted) = lighting.emitted(&walk.ray, &met.hit, &state.wavelengths)
+        {
             self.meet(state, direction, &emitted);
         }
         if lighting.replaces_material(&met.hit) {
@@ -287,7 +256,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             Some(tangent) => Frame::along(normal, tangent),
             None => Frame::about(normal),
         };
-        let surface = Scatterer {
+        let mut surface = Scatterer {
             met,
             n_g,
             frame,
@@ -300,15 +269,41 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 time: walk.ray.time,
             },
             far: far.as_ref().map(|far| far.medium),
+            look: None,
         };
         if !surface.bsdf.is_smooth() && !lighting.is_empty() {
-            let [u_light, u, v, _] = numbers.draw();
-            if let Some(light) = lighting.sample(&surface.receiver, &state.wavelengths, u_light, [u, v]) {
-                self.add_direct(walk, &surface, &light, state, numbers);
+            match state.purpose {
+                Purpose::Focused => return false,
+                Purpose::Photon => {
+                    let (from, carried) = (walk.ray.origin, state.carried::<DISPERSIVE>());
+                    let arrival = Arrival { point: met.point, from, carried };
+                    state.arrival = (state.smooth_events > 0).then_some(arrival);
+                    return false;
+                }
+                Purpose::Picture => {
+                    let [u_light, u, v, u_look] = numbers.draw();
+                    if let Some(light) = lighting.sample(&surface.receiver, &state.wavelengths, u_light, [u, v]) {
+                        self.add_direct(walk, &surface, &light, state, numbers);
+                    }
+                    surface.look = guide.and_then(|guide| {
+                        let region = guide.region(met.point)?;
+                        let weight = state.carried::<DISPERSIVE>().mean().clamp(0.0, 1.0);
+                        Some(Look { region, probability: guide.probability(region) * weight })
+                    });
+                    self.add_focused(walk, &surface, state, u_look, numbers);
+                }
             }
         }
-        let [u_lobe, u, v, u_roulette] = numbers.draw();
+        let [mut u_lobe, u, v, u_roulette] = numbers.draw();
+        let explores = state.purpose == Purpose::Photon && u_roulette < 2.0 * EXPLORED;
+        if explores {
+            u_lobe = if u_roulette < EXPLORED { 0.0 } else { 1.0 - f32::EPSILON };
+        }
         let Some(sample) = surface.bsdf.sample(surface.wo, u_lobe, [u, v]) else { return false };
+        if state.purpose == Purpose::Photon && sample.pdf.hero() < 1.0 {
+            let probability = sample.pdf.hero();
+            state.throughput *= probability / ((1.0 - 2.0 * EXPLORED) * probability + EXPLORED);
+        }
         state.depth = state.depth.after(sample.event);
         if !state.depth.is_within(&limits) {
             return false;
@@ -330,24 +325,24 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                     receiver: surface.receiver,
                     r_over_pdf: before * (1.0 / hero),
                     diffuse_share: sample.diffuse.safe_div(sample.weight),
+                    look: surface.look.filter(|_| !passes),
+                    direction: turned,
                 });
+                state.smooth_events = 0;
                 (turned, passes)
             }
             Scattered::Mirror => {
-                state.vertex = None;
+                state.pass_smoothly();
                 let ior = medium.jet();
                 let scattering = mirror(ior.ior * direction, &met.surface, &ior);
                 ((scattering.momentum_out / ior.ior).normalize(), false)
             }
             Scattered::Refract => {
-                state.vertex = None;
+                state.pass_smoothly();
                 let (ior_i, ior_t) = (medium.jet(), far_medium.jet());
                 let scattering = refract_or_reflect(ior_i.ior * direction, &met.surface, &ior_i, &ior_t);
                 if DISPERSIVE && (medium.is_dispersive || far_medium.is_dispersive) {
-                    // No companion goes this way.
-                    for lane in 1..N {
-                        (state.throughput[lane], state.r[lane]) = (0.0, 0.0);
-                    }
+                    state.leave_companions();
                 }
                 // f32 has let pass what f64 reflects: at the last digit before the critical angle.
                 let passes = scattering.kind == ScatterKind::Refraction;
@@ -355,7 +350,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 ((scattering.momentum_out / ior).normalize(), passes)
             }
             Scattered::Straight => {
-                state.vertex = None;
+                state.pass_smoothly();
                 (direction, true)
             }
         };
@@ -385,7 +380,9 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         if !(carried > 0.0 && carried.is_finite()) {
             return false;
         }
-        if state.depth.total() < ROULETTE_FROM {
+        // What is looked for is not many paths.
+        let from = if state.purpose == Purpose::Picture { ROULETTE_FROM } else { ENDING_FROM };
+        if state.depth.total() < from {
             return true;
         }
         let most = if state.depth.total() < ENDING_FROM { 1.0 } else { MOST_LIKELY };
@@ -395,120 +392,6 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         }
         state.throughput *= 1.0 / probability;
         true
-    }
-
-    /// Adds what a sampled point of a light sends by way of the surface.
-    fn add_direct(
-        &mut self,
-        walk: &Walk<'a>,
-        surface: &Scatterer<'_, N>,
-        light: &LightSample<N>,
-        state: &State<N>,
-        numbers: &PathSampler,
-    ) {
-        let wi = surface.frame.to_local(light.wi);
-        let passes = light.wi.dot(surface.n_g) < 0.0;
-        // A side that the shading normal makes up is not lit.
-        if passes != (wi.z < 0.0) {
-            return;
-        }
-        let mut f = surface.bsdf.evaluate(surface.wo, wi);
-        let source = self.setting.lighting.light(light.light);
-        if let Some(source) = source
-            && has_factors(source)
-        {
-            f.diffuse *= source.diffuse as f32;
-            f.glossy *= source.specular as f32;
-        }
-        let gloss = if passes { bsdf::Event::GlossyTransmission } else { bsdf::Event::GlossyReflection };
-        let limits = &self.setting.limits;
-        if !state.depth.after(bsdf::Event::Diffuse).is_within(limits) {
-            f.diffuse = SampledSpectrum::ZERO;
-        }
-        if !state.depth.after(gloss).is_within(limits) {
-            f.glossy = SampledSpectrum::ZERO;
-        }
-        let carried = state.throughput * light.radiance;
-        if (carried * f.value()).is_black() {
-            return;
-        }
-        let Some(through) = self.visibility(walk, surface, light, source, state, numbers) else { return };
-        let weight = match (light.is_delta, DISPERSIVE) {
-            (true, true) => 1.0 / (state.r * light.pdf).mean(),
-            (true, false) => 1.0 / light.pdf,
-            (false, true) => 1.0 / (state.r * (f.pdf + SampledSpectrum::splat(light.pdf))).mean(),
-            (false, false) => 1.0 / (f.pdf.hero() + light.pdf),
-        };
-        let carried = carried * through * weight;
-        if !self.ledger.is_divided() {
-            self.ledger.total += carried * f.value();
-            return;
-        }
-        let emission = self.emission(light.light);
-        let ways = [
-            (Event::scattering(bsdf::Event::Diffuse, passes), carried * f.diffuse),
-            (Event::scattering(gloss, passes), carried * f.glossy),
-        ];
-        self.ledger.add_scattered(&ways, emission);
-    }
-
-    /// What comes through from a sampled point of a light; `None` if nothing does.
-    fn visibility(
-        &mut self,
-        walk: &Walk<'a>,
-        surface: &Scatterer<'_, N>,
-        light: &LightSample<N>,
-        source: Option<&Light>,
-        state: &State<N>,
-        numbers: &PathSampler,
-    ) -> Option<SampledSpectrum<N>> {
-        let met = surface.met;
-        let medium = match surface.far {
-            Some(medium) if light.wi.dot(surface.n_g) < 0.0 => medium,
-            _ => walk.media.current(),
-        };
-        let mut through = self.media.of(medium).transmittance(light.distance).unwrap_or(SampledSpectrum::ONE);
-        let shadow = source.map(|light| &light.shadow);
-        if shadow.is_some_and(|shadow| !shadow.is_enabled) {
-            return Some(through);
-        }
-        let set = source.and_then(|light| light.shadowed_by);
-        let mut departures = walk.departures;
-        departures.depart(&walk.ray, &met.hit, light.wi.dot(met.surface.n_g) > 0.0);
-        let ray = Ray { origin: met.point, direction: light.wi, ..walk.ray };
-        self.counters.rays += 1;
-        let natural = shadow.is_none_or(|shadow| shadow.is_natural());
-        let mut nearest = f64::INFINITY;
-        let view = self.setting.view;
-        let is_blocked = view.aggregate.is_blocked(&ray, &departures, before(light.distance), |hit| {
-            if set.is_some_and(|set| !view.scene.is_linked(set, hit.instance)) {
-                return false;
-            }
-            match surface::through::<N>(view, hit, numbers) {
-                None => false,
-                Some(part) if part.is_black() => {
-                    nearest = nearest.min(hit.distance);
-                    natural
-                }
-                Some(part) => {
-                    through *= part;
-                    false
-                }
-            }
-        });
-        if natural {
-            return (!is_blocked).then_some(through);
-        }
-        if nearest.is_finite()
-            && let Some(shadow) = shadow
-        {
-            // What is seen in full shadow is the light times the shadow's colour.
-            let strength = shadow.strength(nearest) as f32;
-            let color = Reflectance::of_color(shadow.color.map(|c| c as f32));
-            let dark = color.at(&state.wavelengths);
-            through *= SampledSpectrum::splat(1.0 - strength) + dark * strength;
-        }
-        Some(through)
     }
 }
 

@@ -1,0 +1,150 @@
+//! What a path has come to between its events.
+
+use glam::{DVec3, Vec3};
+
+use super::depth::Depth;
+use super::guide::RegionId;
+use crate::bsdf::Bsdf;
+use crate::integrator::frame::Frame;
+use crate::integrator::walk::SurfacePoint;
+use crate::lighting::Receiver;
+use crate::optics::media::MediumId;
+use crate::spectrum::{SampledSpectrum, Wavelengths};
+
+/// What a path is followed for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// All its light.
+    Picture,
+    /// What shines by way of smooth surfaces alone; it ends at the first other one.
+    Focused,
+    /// Where light arrives by way of smooth surfaces alone: it comes from a light.
+    Photon,
+}
+
+/// Light by way of smooth surfaces is looked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
+    /// Where the guide knows of some.
+    pub(super) region: RegionId,
+    /// With this probability.
+    pub(super) probability: f32,
+}
+
+/// The last vertex that chose a direction by a density.
+pub(super) struct Vertex<const N: usize> {
+    pub(super) receiver: Receiver,
+    /// r before its event, over the density of the direction.
+    pub(super) r_over_pdf: SampledSpectrum<N>,
+    /// The part of its weight that is diffuse.
+    pub(super) diffuse_share: SampledSpectrum<N>,
+    /// How the guide could have found the direction.
+    pub(super) look: Option<Look>,
+    /// Away from it.
+    pub(super) direction: DVec3,
+}
+
+/// Where a photon has arrived.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arrival<const N: usize> {
+    pub(super) point: DVec3,
+    /// The last event.
+    pub(super) from: DVec3,
+    /// What is left of its light.
+    pub(super) carried: SampledSpectrum<N>,
+}
+
+/// What a path has come to.
+pub(super) struct State<const N: usize> {
+    pub(super) purpose: Purpose,
+    pub(super) wavelengths: Wavelengths<N>,
+    pub(super) throughput: SampledSpectrum<N>,
+    pub(super) r: SampledSpectrum<N>,
+    pub(super) vertex: Option<Vertex<N>>,
+    /// Smooth events since the vertex, or the start.
+    pub(super) smooth_events: u32,
+    /// The object of the last event: only lights that are linked to it count.
+    pub(super) object: Option<u32>,
+    pub(super) depth: Depth,
+    /// Since the camera light was only let through.
+    pub(super) sees_through: bool,
+    pub(super) alpha: f32,
+    /// Squared index of the medium over that of the first: what refraction has taken from β without taking light, and gives back.
+    pub(super) squeezed: f32,
+    /// Where a photon has arrived.
+    pub(super) arrival: Option<Arrival<N>>,
+}
+
+impl<const N: usize> State<N> {
+    /// At the start of a path.
+    pub(super) fn new(purpose: Purpose, wavelengths: Wavelengths<N>) -> Self {
+        Self {
+            purpose,
+            wavelengths,
+            throughput: SampledSpectrum::ONE,
+            r: SampledSpectrum::ONE,
+            vertex: None,
+            smooth_events: 0,
+            object: None,
+            depth: Depth::default(),
+            sees_through: purpose == Purpose::Picture,
+            alpha: 0.0,
+            squeezed: 1.0,
+            arrival: None,
+        }
+    }
+
+    /// Whether lights that its ray meets count.
+    pub(super) fn meets_lights(&self) -> bool {
+        match self.purpose {
+            Purpose::Picture => true,
+            Purpose::Focused => self.smooth_events > 0,
+            Purpose::Photon => false,
+        }
+    }
+
+    /// β / mean(r): what radiance from here counts.
+    pub(super) fn carried<const DISPERSIVE: bool>(&self) -> SampledSpectrum<N> {
+        if DISPERSIVE { self.throughput * (1.0 / self.r.mean()) } else { self.throughput }
+    }
+
+    /// The path's light ends in what is no part of the picture: as much of the pixel stays open.
+    pub(super) fn open<const DISPERSIVE: bool>(&mut self) {
+        if self.alpha > 0.0 {
+            self.alpha -= self.carried::<DISPERSIVE>().mean().clamp(0.0, 1.0);
+        }
+    }
+
+    /// A smooth event; only what the guide may have found still has another way to be found.
+    pub(super) fn pass_smoothly(&mut self) {
+        self.smooth_events += 1;
+        if self.vertex.as_ref().is_some_and(|vertex| vertex.look.is_none()) {
+            self.vertex = None;
+        }
+    }
+
+    /// No companion goes where the hero goes.
+    pub(super) fn leave_companions(&mut self) {
+        for lane in 1..N {
+            (self.throughput[lane], self.r[lane]) = (0.0, 0.0);
+            if let Some(vertex) = &mut self.vertex {
+                vertex.r_over_pdf[lane] = 0.0;
+            }
+        }
+    }
+}
+
+/// A surface that scatters, where the path has met it.
+pub(super) struct Scatterer<'s, const N: usize> {
+    pub(super) met: &'s SurfacePoint,
+    /// Geometric normal on the side of the path.
+    pub(super) n_g: DVec3,
+    pub(super) frame: Frame,
+    pub(super) wo: Vec3,
+    pub(super) bsdf: Bsdf<N>,
+    pub(super) receiver: Receiver,
+    /// The medium behind, where the surface bounds one.
+    pub(super) far: Option<Option<MediumId>>,
+    /// Whether focused light is looked for.
+    pub(super) look: Option<Look>,
+}
