@@ -18,6 +18,8 @@ use crate::Result;
 
 /// Normals that differ from the facet's by less are the facet's, computed by an exporter in f32: sixteen of its steps.
 const FLAT: f64 = 16.0 / 16_777_216.0;
+/// Of so few triangles a ray asks every one: that takes no longer than to get ready for the tree.
+const FEW: usize = 4;
 
 /// Triangles over authored points, with the tree over them.
 #[derive(Debug)]
@@ -387,15 +389,20 @@ impl Mesh {
         let sheared = ShearedRay::new(origin, direction);
         let triangles = self.triangles.as_slice();
         let from = start.map_or(0.0, |start| -behind(start.magnitude));
-        self.tree.walk(origin, direction, from, limit, 1.0, |primitive, limit| {
+        let left = start.and_then(Start::left);
+        let mut meet = |primitive: u32, limit: f64| {
+            if left == Some(primitive) {
+                return limit;
+            }
             let corners = triangles[primitive as usize].map(&point);
             let Some(hit) = sheared.intersect(corners) else { return limit };
             let (distance, at_start) = match start {
                 None if hit.distance > 0.0 => (hit.distance, false),
                 None => return limit,
                 Some(start) => {
-                    let relative = |primitive| self.corners(primitive, time).map(|p| p - origin);
-                    match start.triangle(primitive, &hit, direction, relative(primitive), relative) {
+                    let relative = corners.map(|p| p.wide() - origin);
+                    let relative_of = |primitive| self.corners(primitive, time).map(|p| p - origin);
+                    match start.triangle(primitive, &hit, direction, relative, relative_of) {
                         Some(met) => (met.distance, met.at_start),
                         None => return limit,
                     }
@@ -403,7 +410,12 @@ impl Mesh {
             };
             let TriangleHit { barycentric, leaving, .. } = hit;
             found(MeshHit { primitive, distance, barycentric, leaving, at_start })
-        });
+        };
+        if triangles.len() <= FEW {
+            (0..triangles.len() as u32).fold(limit, |limit, primitive| meet(primitive, limit));
+            return;
+        }
+        self.tree.walk(origin, direction, from, limit, 1.0, meet);
     }
 
     /// Calls `found` with every crossing at a distance > 0, asking every triangle.

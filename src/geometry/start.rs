@@ -23,6 +23,8 @@ const TRIANGLE_ERRORS: f64 = 8.0;
 /// Crossings are kept while the ray has not left their place by more than this many bounds: further than what counts as
 /// here, so that a surface just crossed is not taken for one that is still to come.
 const KEPT: f64 = 4.0;
+/// The same with room for rounding: what is higher than this many bounds is not here.
+const FAR: f64 = 5.0;
 /// A surface may cut the ray behind its start, by rounding: at most by half the digits, where a grazing ray makes the
 /// bound on the distance from the plane a long way along the ray.
 const BEHIND: f64 = 1.0 / 67_108_864.0;
@@ -56,8 +58,13 @@ impl Start<'_> {
         Some((self.crossings[index], index + 1 == self.crossings.len()))
     }
 
-    /// Whether a triangle that the ray's line crosses is met. `corners` are relative to the start; `corners_of` gives those
-    /// of another triangle of the mesh.
+    /// The primitive of this instance that the ray has left last, if no other instance was left since: it is not met here.
+    pub(super) fn left(&self) -> Option<u32> {
+        self.crossings.last().filter(|crossing| crossing.instance == self.instance).map(|crossing| crossing.primitive)
+    }
+
+    /// Whether a triangle that the ray's line crosses is met, which is not the one that it has [left](Self::left). `corners` are
+    /// relative to the start; `corners_of` gives those of another triangle of the mesh.
     pub(super) fn triangle(
         &self,
         primitive: u32,
@@ -66,17 +73,18 @@ impl Start<'_> {
         corners: [DVec3; 3],
         corners_of: impl Fn(u32) -> [DVec3; 3],
     ) -> Option<Met> {
-        if let Some((crossing, true)) = self.last()
-            && crossing.primitive == primitive
-        {
-            return None;
-        }
         let [a, b, c] = corners;
         let (e1, e2) = (b - a, c - a);
         let normal = e1.cross(e2);
-        let area = normal.length();
-        let height = (hit.distance * direction.dot(normal)).abs() / area;
+        let raised = (hit.distance * direction.dot(normal)).abs();
         let size = corners.map(|p| p.abs().max_element()).into_iter().fold(0.0, f64::max);
+        // Most are far away, beyond doubt: |e1||e2| is at least the area. The rest takes roots and quotients.
+        let most = FAR * UNIT_ROUNDOFF * (START_ERRORS * self.magnitude + TRIANGLE_ERRORS * size);
+        if raised * raised > most * most * (e1.length_squared() * e2.length_squared()) {
+            return (hit.distance > 0.0).then_some(Met { distance: hit.distance, at_start: false });
+        }
+        let area = normal.length();
+        let height = raised / area;
         let slenderness = e1.length() * e2.length() / area;
         let error = UNIT_ROUNDOFF * (START_ERRORS * self.magnitude + TRIANGLE_ERRORS * size * slenderness);
         if height > error {

@@ -27,6 +27,8 @@ const F32_STEP: f64 = 1.0 / 8_388_608.0;
 
 /// Entries of a stack for trees of eight levels, a few hundred to some thousand primitives.
 const SHALLOW: usize = stack_of(8);
+/// Of trees of one node.
+const FLAT: usize = stack_of(1);
 
 /// What waits on the stack: a node (`count` 0) or a leaf, and where the ray enters it.
 #[derive(Clone, Copy)]
@@ -35,6 +37,8 @@ struct Waiting {
     first: u32,
     count: u32,
 }
+
+const WAITING: Waiting = Waiting { near: 0.0, first: 0, count: 0 };
 
 /// The ray in the units of the boxes.
 struct Slabs {
@@ -60,17 +64,20 @@ impl Tree {
         spread: f64,
         visit: impl FnMut(u32, f64) -> f64,
     ) {
-        // Most trees are shallow, and clearing a stack that is never used takes longer than a step.
-        if self.stack <= SHALLOW {
-            self.walk_with::<SHALLOW>(origin, direction, start, limit, spread, visit);
+        // Clearing a stack that is never used takes longer than a step.
+        if self.stack <= FLAT {
+            self.walk_with(&mut [WAITING; FLAT], origin, direction, start, limit, spread, visit);
+        } else if self.stack <= SHALLOW {
+            self.walk_with(&mut [WAITING; SHALLOW], origin, direction, start, limit, spread, visit);
         } else {
-            self.walk_with::<STACK>(origin, direction, start, limit, spread, visit);
+            self.walk_with(&mut [WAITING; STACK], origin, direction, start, limit, spread, visit);
         }
     }
 
-    #[inline(always)]
-    fn walk_with<const STACK: usize>(
+    #[expect(clippy::too_many_arguments, reason = "those of `walk`, and memory")]
+    fn walk_with(
         &self,
+        stack: &mut [Waiting],
         origin: DVec3,
         direction: DVec3,
         start: f64,
@@ -120,7 +127,6 @@ impl Tree {
         let reach = |limit: f64| ((limit * scale - enter) * FAR_FACTOR + padding) as f32;
         let mut farthest = reach(limit);
 
-        let mut stack = [Waiting { near: 0.0, first: 0, count: 0 }; STACK];
         let mut len = 1;
         while len > 0 {
             len -= 1;

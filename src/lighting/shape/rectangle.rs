@@ -39,10 +39,24 @@ struct Seen {
     z: f64,
     /// Unit vector along z, away from the rectangle.
     axis: DVec3,
-    b0: f64,
-    b1: f64,
-    k: f64,
     solid_angle: f64,
+}
+
+/// The solid angle of [x₀, x₁] × [y₀, y₁] from a height over the plane. Each corner has atan(xy/√(1 + x² + y²)) in units of the
+/// height, with alternating signs; their sum is the argument of a product.
+fn subtended(x: [f64; 2], y: [f64; 2], height: f64) -> f64 {
+    let scale = 1.0 / height;
+    let ([x0, x1], [y0, y1]) = (x.map(|x| x * scale), y.map(|y| y * scale));
+    let corner = |x: f64, y: f64| [(1.0 + x * x + y * y).sqrt(), x * y];
+    let product = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a * c - b * d, a * d + b * c];
+    let conjugate = |[a, b]: [f64; 2]| [a, -b];
+    let upper = product(corner(x1, y1), conjugate(corner(x0, y1)));
+    let lower = product(corner(x0, y0), conjugate(corner(x1, y0)));
+    let [re, im] = product(upper, lower);
+    let angle = libm::atan2(im, re);
+    // More than π is seen from near over it only; all else below 0 is rounding.
+    let is_over_it = x0 < 0.0 && x1 > 0.0 && y0 < 0.0 && y1 > 0.0 && (x1 - x0) * (y1 - y0) > 1.0;
+    if angle < 0.0 && is_over_it { angle + 2.0 * PI } else { angle }
 }
 
 impl Rectangle {
@@ -100,14 +114,9 @@ impl Rectangle {
         let (x0, y0) = (corner.dot(self.axes[0]), corner.dot(self.axes[1]));
         let (x, y) = ([x0, x0 + 2.0 * self.lengths[0]], [y0, y0 + 2.0 * self.lengths[1]]);
         let z = -height.abs();
-        // z components of the normals of the planes through the eye and a side.
-        let across = |a: f64| a / libm::hypot(a, z);
-        let (n0, n1, n2, n3) = (-across(y[0]), across(x[1]), across(y[1]), -across(x[0]));
-        let angle = |a: f64, b: f64| libm::acos((-a * b).clamp(-1.0, 1.0));
-        let (g0, g1, g2, g3) = (angle(n0, n1), angle(n1, n2), angle(n2, n3), angle(n3, n0));
-        let solid_angle = g0 + g1 + g2 + g3 - 2.0 * PI;
+        let solid_angle = subtended(x, y, height.abs());
         let axis = if height > 0.0 { self.normal } else { -self.normal };
-        (solid_angle >= SMALLEST).then_some(Seen { x, y, z, axis, b0: n0, b1: n2, k: 2.0 * PI - g2 - g3, solid_angle })
+        (solid_angle >= SMALLEST).then_some(Seen { x, y, z, axis, solid_angle })
     }
 
     /// How large it looks from a point, steradian; `None` where that is little and from where it is dark.
@@ -156,14 +165,26 @@ impl Rectangle {
 impl Seen {
     /// From the eye to the point with the coordinates `u` of the unit square.
     fn point(&self, [u, v]: [f64; 2], axes: [DVec3; 2]) -> DVec3 {
-        let Self { x, y, z, axis, b0, b1, k, solid_angle } = *self;
-        let au = u * solid_angle + k;
-        let fu = (libm::cos(au) * b0 - b1) / libm::sin(au);
-        let cu = (1f64.copysign(fu) / libm::hypot(fu, b0)).clamp(-1.0, 1.0);
+        let Self { x, y, z, axis, solid_angle } = *self;
+        // z components of the normals of the planes through the eye and a side, but for their signs, and what their squares leave of 1.
+        let across = |a: f64| {
+            let length = (a * a + z * z).sqrt();
+            (a / length, z * z / (length * length))
+        };
+        let ((minus_b0, rest0), (b1, rest2), (minus_n3, rest3)) = (across(y[0]), across(y[1]), across(x[0]));
+        let b0 = -minus_b0;
+        // γ₂ and γ₃, of which k is 2π − γ₂ − γ₃: cos γ₂ = −n₂n₃, cos γ₃ = −n₃n₀.
+        let (cos2, sin2) = (b1 * minus_n3, (rest2 + b1 * b1 * rest3).sqrt());
+        let (cos3, sin3) = (minus_n3 * b0, (rest0 + b0 * b0 * rest3).sqrt());
+        let (cos_k, sin_k) = (cos2 * cos3 - sin2 * sin3, -(sin2 * cos3 + cos2 * sin3));
+        let (sin, cos) = libm::sincos(u * solid_angle);
+        let (cos_au, sin_au) = (cos * cos_k - sin * sin_k, sin * cos_k + cos * sin_k);
+        let fu = (cos_au * b0 - b1) / sin_au;
+        let cu = (1f64.copysign(fu) / (fu * fu + b0 * b0).sqrt()).clamp(-1.0, 1.0);
         let sine = (1.0 - cu * cu).sqrt();
         let xu = if sine > 0.0 { (-cu * z / sine).clamp(x[0], x[1]) } else { x[usize::from(cu > 0.0)] };
-        let d = libm::hypot(xu, z);
-        let [h0, h1] = y.map(|y| y / libm::hypot(d, y));
+        let d = (xu * xu + z * z).sqrt();
+        let [h0, h1] = y.map(|y| y / (d * d + y * y).sqrt());
         let h = h0 + v * (h1 - h0);
         let rest = 1.0 - h * h;
         let yv = if rest > 0.0 { (h * d / rest.sqrt()).clamp(y[0], y[1]) } else { y[usize::from(h > 0.0)] };
