@@ -319,6 +319,10 @@ impl Aggregate {
 
     /// The hit point, on the surface to rounding, and the surface around it.
     pub fn local_surface(&self, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
+        // The common case by itself: the answer is long, and written once.
+        if let Some((shape, Standing::Still(frame))) = self.singles.get(hit.instance as usize) {
+            return Placed { shape, frame, time: ray.time }.local_surface(ray, hit);
+        }
         self.with(hit.instance, ray.time, |placed| placed.local_surface(ray, hit)).expect("it was met at this time")
     }
 

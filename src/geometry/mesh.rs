@@ -288,10 +288,18 @@ impl Mesh {
     }
 
     /// The moved points at a time; `None` where the mesh has its own.
+    #[inline]
     fn deformed(&self, time: f64) -> Option<Deformed<'_>> {
         if time == 0.0 { None } else { self.deformation.as_ref().map(|deformation| deformation.at(time)) }
     }
 
+    /// Largest coordinate of a triangle.
+    pub(super) fn reach(&self, primitive: u32, time: f64) -> f64 {
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        self.corners(primitive, time).into_iter().fold(0.0, |reach, p| larger(p.abs().max_element(), reach))
+    }
+
+    #[inline]
     pub(crate) fn corners(&self, primitive: u32, time: f64) -> [DVec3; 3] {
         match self.deformed(time) {
             None => self.corners_f32(primitive).map(widen),
@@ -431,6 +439,7 @@ impl Mesh {
         }
     }
 
+    #[inline]
     fn corners_f32(&self, primitive: u32) -> [[f32; 3]; 3] {
         let points = self.points.as_slice();
         self.triangles[primitive as usize].map(|p| points[p as usize])

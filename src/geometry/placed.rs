@@ -41,6 +41,8 @@ pub(super) struct Frame {
     pub(super) similarity: Option<f64>,
     norm: f64,
     inverse_norm: f64,
+    /// Largest coordinate of the translation.
+    offset: f64,
 }
 
 /// A ray in object space.
@@ -65,6 +67,7 @@ impl Frame {
             similarity: similarity(linear),
             norm: norm(linear),
             inverse_norm: norm(inverse),
+            offset: (translation - origin).abs().max_element(),
         }
     }
 
@@ -75,13 +78,13 @@ impl Frame {
 
     /// |L||v| + |t| for coordinates up to `extent`.
     fn reach_of(&self, extent: f64) -> f64 {
-        self.norm * extent + self.translation.abs().max_element()
+        self.norm * extent + self.offset
     }
 
     /// The size of the numbers rounded on the way of a ray's start to object space (`start.rs`). `magnitude` is |p| + reach
     /// in render space.
     pub(super) fn start_magnitude(&self, magnitude: f64, ray: &ObjectRay) -> f64 {
-        let there = magnitude + self.translation.abs().max_element() + self.norm * ray.origin.abs().max_element();
+        let there = magnitude + self.offset + self.norm * ray.origin.abs().max_element();
         self.inverse_norm * there
     }
 
@@ -125,10 +128,7 @@ impl Placed<'_> {
         let extent = match self.shape {
             Shape::Sphere(sphere) => sphere.radius(),
             Shape::Solid(solid) => solid.extent(),
-            Shape::Mesh(mesh) => {
-                let corners = mesh.corners(primitive, self.time);
-                corners.into_iter().map(|p| p.abs().max_element()).fold(0.0, f64::max)
-            }
+            Shape::Mesh(mesh) => mesh.reach(primitive, self.time),
         };
         self.reach_of(extent)
     }

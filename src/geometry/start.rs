@@ -77,7 +77,8 @@ impl Start<'_> {
         let (e1, e2) = (b - a, c - a);
         let normal = e1.cross(e2);
         let raised = (hit.distance * direction.dot(normal)).abs();
-        let size = corners.map(|p| p.abs().max_element()).into_iter().fold(0.0, f64::max);
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        let size = corners.iter().fold(0.0, |size, p| larger(p.abs().max_element(), size));
         // Most are far away, beyond doubt: |e1||e2| is at least the area. The rest takes roots and quotients.
         let most = FAR * UNIT_ROUNDOFF * (START_ERRORS * self.magnitude + TRIANGLE_ERRORS * size);
         if raised * raised > most * most * (e1.length_squared() * e2.length_squared()) {

@@ -102,7 +102,7 @@ struct Scatterer<'s, const N: usize> {
     n_g: DVec3,
     frame: Frame,
     wo: Vec3,
-    bsdf: Bsdf<N>,
+    bsdf: &'s Bsdf<N>,
     receiver: Receiver,
     /// The medium behind, where the surface bounds one.
     far: Option<Option<MediumId>>,
@@ -155,7 +155,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 }
                 self.meet(&state, ray.direction, &light);
             });
-            let Some(met) = met else {
+            let Some(mut met) = met else {
                 // What absorbs lets nothing through from infinitely far.
                 let absorbs = |sigma: &SampledSpectrum<N>| sigma.0.iter().any(|&sigma| sigma > 0.0);
                 if !medium.absorption.as_ref().is_some_and(absorbs) {
@@ -166,7 +166,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             if let Some(through) = medium.transmittance(limit) {
                 state.throughput *= through;
             }
-            let met = walk.in_contact(met, &mut self.counters);
+            walk.in_contact(&mut met, &mut self.counters);
             if walk.crossings > MAX_CROSSINGS {
                 self.counters.exhausted += 1;
                 break;
@@ -287,12 +287,14 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             Some(tangent) => Frame::along(normal, tangent),
             None => Frame::about(normal),
         };
+        // Moving it would take longer than what most surfaces need of it.
+        let bsdf = &Bsdf::new(&at.parameters);
         let surface = Scatterer {
             met,
             n_g,
             frame,
             wo: frame.to_local(-direction),
-            bsdf: Bsdf::new(&at.parameters),
+            bsdf,
             receiver: Receiver {
                 point: met.point,
                 normal: (!at.transmits).then(|| n_g.as_vec3()),

@@ -21,6 +21,8 @@ pub(in crate::lighting) struct Rectangle {
     center: DVec3,
     /// From the middle to the sides.
     half: [DVec3; 2],
+    /// What has the scalar product 1 with one of them and 0 with the other, in the plane.
+    dual: [DVec3; 2],
     /// Unit vectors of both.
     axes: [DVec3; 2],
     lengths: [f64; 2],
@@ -64,13 +66,15 @@ impl Rectangle {
     pub(in crate::lighting) fn new(center: DVec3, u: DVec3, v: DVec3, normal: DVec3, is_two_sided: bool) -> Self {
         let lengths = [u.length(), v.length()];
         let axes = [u / lengths[0], v / lengths[1]];
+        let n = u.cross(v);
         Self {
             center,
             half: [u, v],
+            dual: [v.cross(n) / n.length_squared(), n.cross(u) / n.length_squared()],
             axes,
             lengths,
             normal,
-            area: 4.0 * u.cross(v).length(),
+            area: 4.0 * n.length(),
             is_right_angled: axes[0].dot(axes[1]).abs() <= PERPENDICULAR,
             is_two_sided,
         }
@@ -92,10 +96,8 @@ impl Rectangle {
 
     /// −1..1 along both sides, of a point of the plane.
     pub(in crate::lighting) fn coordinates(&self, point: DVec3) -> [f64; 2] {
-        let ([u, v], q) = (self.half, point - self.center);
-        let n = u.cross(v);
-        let scale = 1.0 / n.length_squared();
-        [q.cross(v).dot(n) * scale, u.cross(q).dot(n) * scale]
+        let q = point - self.center;
+        self.dual.map(|dual| q.dot(dual))
     }
 
     /// Height of a point over the plane; `None` on the side that is dark and in the plane.
