@@ -537,6 +537,16 @@ impl Placed<'_> {
         })
     }
 
+    /// Whether the ray has just left a sheet, which it cannot meet.
+    #[inline]
+    fn is_behind(&self, instance: u32, object: &ObjectRay, standing: Option<(&Departures, f64)>) -> bool {
+        let last = standing.and_then(|(departures, _)| departures.crossings().last());
+        last.is_some_and(|last| {
+            last.instance == instance
+                && matches!(self.shape, Shape::Mesh(mesh) if mesh.is_behind(last.outward, object.direction))
+        })
+    }
+
     /// Whether a surface before `limit` is one that `blocks`.
     fn meets(
         &self,
@@ -562,6 +572,9 @@ impl Placed<'_> {
             });
         };
         let object = self.ray(ray);
+        if self.is_behind(instance, &object, standing) {
+            return false;
+        }
         let start = self.start(&object, instance, standing);
         let limit = limit * object.stretch;
         let mut is_blocked = false;
@@ -574,6 +587,9 @@ impl Placed<'_> {
 
     fn intersect(&self, ray: &Ray, instance: u32, standing: Option<(&Departures, f64)>, nearest: &mut Nearest) {
         let object = self.ray(ray);
+        if self.is_behind(instance, &object, standing) {
+            return;
+        }
         let start = self.start(&object, instance, standing);
         match self.shape {
             Shape::Mesh(mesh) => {

@@ -9,7 +9,7 @@ use super::Buffer;
 use super::cut::{Corners, Cut, is_sliver, uncut};
 use super::motion::{Between, Deformation, Deformed};
 use super::polygons::{NamedPrimvar, PolygonMesh, PrimvarView};
-use super::start::{Start, behind};
+use super::start::{Relation, Start, behind, relation};
 use super::subdivision::{Refined, Refiner};
 use super::topology;
 use super::tree::{Bounds, Tree};
@@ -20,6 +20,8 @@ use crate::Result;
 const FLAT: f64 = 16.0 / 16_777_216.0;
 /// Of so few triangles a ray asks every one: that takes no longer than to get ready for the tree.
 const FEW: usize = 4;
+/// Sine of an angle between a ray and a plane that no rounding turns round.
+const GRAZING: f64 = 1e-9;
 
 /// Triangles over authored points, with the tree over them.
 #[derive(Debug)]
@@ -38,6 +40,8 @@ pub struct Mesh {
     slots: Option<Vec<u16>>,
     tree: Tree,
     bounds: Bounds,
+    /// The normal of all triangles, if they are few, lie in one plane and face the same way.
+    sheet: Option<DVec3>,
 }
 
 /// What was found when a mesh was made.
@@ -246,7 +250,9 @@ impl Mesh {
             slots,
             tree,
             bounds,
+            sheet: None,
         };
+        mesh.sheet = mesh.find_sheet();
         mesh.settle_normals();
         report.normals_reversed = mesh.normals_reversed;
         (mesh, report)
@@ -443,6 +449,28 @@ impl Mesh {
     fn corners_f32(&self, primitive: u32) -> [[f32; 3]; 3] {
         let points = self.points.as_slice();
         self.triangles[primitive as usize].map(|p| points[p as usize])
+    }
+
+    fn find_sheet(&self) -> Option<DVec3> {
+        if self.deformation.is_some() || self.is_empty() || self.len() > FEW {
+            return None;
+        }
+        let corners = |primitive: usize| self.corners(primitive as u32, 0.0);
+        let is_sheet = |(i, j): (usize, usize)| {
+            [true, false].into_iter().all(|outward| relation(corners(i), corners(j), outward) == Relation::SameSheet)
+        };
+        let [a, b, c] = corners(0);
+        let pairs = (0..self.len()).flat_map(|i| (0..self.len()).map(move |j| (i, j)));
+        pairs.filter(|(i, j)| i != j).all(is_sheet).then(|| (b - a).cross(c - a).normalize())
+    }
+
+    /// Whether a ray that has left a triangle on this side, whatever else it stands on, cannot meet the mesh: it is one sheet, and
+    /// the ray runs away from it, beyond doubt.
+    pub(super) fn is_behind(&self, outward: bool, direction: DVec3) -> bool {
+        self.sheet.is_some_and(|normal| {
+            let rise = normal.dot(direction);
+            if outward { rise > GRAZING } else { rise < -GRAZING }
+        })
     }
 
     /// Drops normals that say nothing, and finds out which way the others point.

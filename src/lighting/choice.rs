@@ -181,9 +181,9 @@ impl Choice {
 
     /// The emitter of a light and the probability with which it is chosen; `u` in 0..1.
     pub(super) fn sample(&self, chooser: &Chooser, is_linked: impl Fn(u32) -> bool, u: f64) -> Option<(u32, f64)> {
+        // Nothing to compare it with: no importance is needed.
         if let Some(Set { illuminates, tree, .. }) = self.lone_tree() {
-            let is_possible =
-                illuminates.is_none_or(&is_linked) && tree.importance(chooser.point, chooser.normal) > 0.0;
+            let is_possible = illuminates.is_none_or(&is_linked) && tree.may_reach(chooser.point, chooser.normal);
             return if is_possible { tree.sample(chooser.point, chooser.normal, u) } else { None };
         }
         let total = self.total(chooser, &is_linked);
@@ -214,8 +214,7 @@ impl Choice {
         let wanted = match (place, self.lone_tree()) {
             (Place::Nowhere, _) => return 0.0,
             (Place::InTree { way, .. }, Some(Set { illuminates, tree, .. })) => {
-                let is_possible =
-                    illuminates.is_none_or(&is_linked) && tree.importance(chooser.point, chooser.normal) > 0.0;
+                let is_possible = illuminates.is_none_or(&is_linked) && tree.may_reach(chooser.point, chooser.normal);
                 return if is_possible { tree.probability(chooser.point, chooser.normal, way) } else { 0.0 };
             }
             (Place::InTree { set, .. }, None) => Candidate::Tree(set),
