@@ -232,7 +232,8 @@ impl Aggregate {
     /// |L||v| + |t| at the surfaces that a ray stands on: the largest.
     fn reach(&self, ray: &Ray, departures: &Departures) -> f64 {
         let reach = |c: &Crossing| self.with(c.instance, ray.time, |placed| placed.reach(c.primitive));
-        departures.crossings().iter().filter_map(reach).fold(0.0, f64::max)
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        departures.crossings().iter().filter_map(reach).fold(0.0, larger)
     }
 
     /// The nearest surface that the ray meets; equal distances are decided by (instance, primitive).
@@ -524,7 +525,7 @@ impl ObjectRay {
 impl Placed<'_> {
     /// What a ray that stands on surfaces knows of them in this object's space.
     fn start<'d>(
-        &self,
+        &'d self,
         object: &ObjectRay,
         instance: u32,
         standing: Option<(&'d Departures, f64)>,
@@ -532,7 +533,8 @@ impl Placed<'_> {
         standing.map(|(departures, magnitude)| Start {
             instance,
             crossings: departures.crossings(),
-            arrival: self.inverse * departures.arrival(),
+            arrival: departures.arrival(),
+            inverse: &self.frame.inverse,
             magnitude: self.start_magnitude(magnitude, object),
         })
     }

@@ -301,8 +301,13 @@ impl Mesh {
 
     /// Largest coordinate of a triangle.
     pub(super) fn reach(&self, primitive: u32, time: f64) -> f64 {
-        let larger = |a: f64, b: f64| if a > b { a } else { b };
-        self.corners(primitive, time).into_iter().fold(0.0, |reach, p| larger(p.abs().max_element(), reach))
+        match self.deformed(time) {
+            None => {
+                let larger = |reach: f32, x: &f32| if x.abs() > reach { x.abs() } else { reach };
+                self.corners_f32(primitive).as_flattened().iter().fold(0.0, larger).into()
+            }
+            Some(_) => self.corners(primitive, time).iter().map(|p| p.abs().max_element()).fold(0.0, f64::max),
+        }
     }
 
     #[inline]

@@ -8,7 +8,7 @@
 //! largest |L||v| + |t| of the surfaces that the ray stands on. The test of a triangle errs by its projected size over its
 //! area: in distance from the plane by less than 8 u · size · |e1||e2| / |e1 × e2|.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::departures::Crossing;
 use super::solid::{Border, Solid};
@@ -40,8 +40,9 @@ pub(super) struct Met {
 pub(super) struct Start<'a> {
     pub(super) instance: u32,
     pub(super) crossings: &'a [Crossing],
-    /// Direction of the ray that arrived here; its length does not matter.
+    /// Render-space direction of the ray that arrived here, and the map from there.
     pub(super) arrival: DVec3,
+    pub(super) inverse: &'a DMat3,
     /// ‖L⁻¹‖ (|p| + |t| + reach + ‖L‖ |o|): the numbers that were rounded.
     pub(super) magnitude: f64,
 }
@@ -52,6 +53,11 @@ pub(super) fn behind(magnitude: f64) -> f64 {
 }
 
 impl Start<'_> {
+    /// The direction of arrival in object space; its length does not matter.
+    fn arrived(&self) -> DVec3 {
+        *self.inverse * self.arrival
+    }
+
     /// The last crossing of this instance here, and whether it is the last of all.
     fn last(&self) -> Option<(Crossing, bool)> {
         let index = self.crossings.iter().rposition(|c| c.instance == self.instance)?;
@@ -97,7 +103,7 @@ impl Start<'_> {
         }
         let met = self.crosses_now(primitive, hit.leaving, corners, &corners_of).unwrap_or_else(|| {
             // Not crossed when the ray arrived, so it is crossed now if the ray still goes the way it came.
-            let arriving = self.arrival.dot(normal);
+            let arriving = self.arrived().dot(normal);
             if hit.leaving { arriving > 0.0 } else { arriving < 0.0 }
         });
         met.then_some(Met { distance: hit.distance.max(0.0), at_start: true })
@@ -165,7 +171,7 @@ impl Start<'_> {
             };
         }
         if (origin.length() - radius).abs() <= error {
-            let arriving = self.arrival.dot(origin);
+            let arriving = self.arrived().dot(origin);
             if along > 0.0 && arriving > 0.0 {
                 return here(true);
             }
@@ -192,7 +198,7 @@ impl Start<'_> {
             Some((crossing, is_last)) => Some((crossing.primitive, !crossing.outward, is_last)),
             None => solid
                 .piece_at(origin, error, |_| true)
-                .map(|primitive| (primitive, self.arrival.dot(solid.piece(primitive, origin).gradient) > 0.0, false)),
+                .map(|primitive| (primitive, self.arrived().dot(solid.piece(primitive, origin).gradient) > 0.0, false)),
         };
         let border = match standing {
             None => solid.borders(origin, direction, None).ahead()?,

@@ -7,6 +7,8 @@ pub struct PiecewiseLinear {
     segments: Vec<Segment>,
     /// The segment in which cell `i` of the unit interval begins.
     guide: Vec<u32>,
+    /// How many cells there are.
+    cells: f64,
 }
 
 /// From one knot to the next.
@@ -62,7 +64,7 @@ impl PiecewiseLinear {
             let width = b.x - a.x;
             Segment { x: a.x, width, pdf: a.pdf, below: a.below, slope: (b.pdf - a.pdf) / width }
         };
-        Self { segments: knots.windows(2).map(segment).collect(), knots, guide }
+        Self { cells: cells as f64, segments: knots.windows(2).map(segment).collect(), knots, guide }
     }
 
     /// The knots in increasing order.
@@ -83,8 +85,8 @@ impl PiecewiseLinear {
     /// The place below which the share `u` of the density lies, and the density there.
     #[inline]
     pub fn inverse(&self, u: f64) -> (f64, f64) {
-        let cell = ((u * self.guide.len() as f64) as usize).min(self.guide.len() - 1);
-        let mut segment = self.guide[cell] as usize;
+        let cell = (u * self.cells) as u32 as usize;
+        let mut segment = *self.guide.get(cell).or(self.guide.last()).expect("there is a segment") as usize;
         while segment + 1 < self.segments.len() && self.segments[segment + 1].below <= u {
             segment += 1;
         }

@@ -45,7 +45,7 @@ const GROUPS: u32 = sobol_burley::NUM_DIMENSIONS / 4;
 #[derive(Clone, Copy, Debug)]
 pub struct PathSampler {
     index: u32,
-    seed: u64,
+    pixel_seed: u64,
     group: u32,
     /// The sample's place in the sequence and the seed of its scrambles.
     point: Point,
@@ -80,30 +80,39 @@ impl Point {
         }
     }
 
+    /// The bits of four dimensions before they are scrambled, in reverse.
+    #[inline]
+    fn sobol_rev(&self, group: u32) -> [u32; 4] {
+        let sums = &SUMS[group as usize];
+        let digit = |k: usize| sums[k][(self.shuffled_rev >> (16 + 4 * k) & 15) as usize];
+        let (a, b, c, d) = (digit(0), digit(1), digit(2), digit(3));
+        std::array::from_fn(|i| a[i] ^ b[i] ^ c[i] ^ d[i])
+    }
+
+    #[inline]
     fn dimension(&self, dimension: u32) -> f32 {
         let (group, lane) = (dimension / 4, dimension as usize % 4);
-        let sobol = parts::sobol_rev(self.shuffled_rev, dimension);
-        let scramble = parts::hash(SCRAMBLES[lane] ^ self.seed ^ group);
-        parts::u32_to_f32_norm(parts::owen_scramble_rev(sobol, scramble).reverse_bits())
+        self.scrambled(self.sobol_rev(group)[lane], group, lane)
     }
 
     /// Four dimensions at once.
     #[inline]
     fn dimensions(&self, group: u32) -> [f32; 4] {
-        let sums = &SUMS[group as usize];
-        let digit = |k: usize| sums[k][(self.shuffled_rev >> (16 + 4 * k) & 15) as usize];
-        let (a, b, c, d) = (digit(0), digit(1), digit(2), digit(3));
-        let sobol: [u32; 4] = std::array::from_fn(|i| a[i] ^ b[i] ^ c[i] ^ d[i]);
-        let scramble = SCRAMBLES.map(|scramble| scramble ^ self.seed ^ group);
-        let scrambled = parts::owen_scramble_int4_rev(sobol.into(), parts::hash_int4(scramble.into()));
-        scrambled.reverse_bits().to_f32_norm()
+        let sobol = self.sobol_rev(group);
+        std::array::from_fn(|lane| self.scrambled(sobol[lane], group, lane))
+    }
+
+    #[inline(always)]
+    fn scrambled(&self, sobol_rev: u32, group: u32, lane: usize) -> f32 {
+        let scramble = parts::hash(SCRAMBLES[lane] ^ self.seed ^ group);
+        parts::u32_to_f32_norm(parts::owen_scramble_rev(sobol_rev, scramble).reverse_bits())
     }
 }
 
 impl PathSampler {
-    fn new(index: u32, seed: u64, group: u32) -> Self {
-        let (in_block, block_seed) = in_block(index, seed);
-        Self { index, seed, group, point: Point::new(in_block, block_seed) }
+    fn new(index: u32, pixel_seed: u64, group: u32) -> Self {
+        let (in_block, block_seed) = in_block(index, pixel_seed);
+        Self { index, pixel_seed, group, point: Point::new(in_block, block_seed) }
     }
 
     /// The place of the hero wavelength, 0..1: stratified over the pixel's samples.
@@ -119,7 +128,7 @@ impl PathSampler {
         if group < GROUPS {
             return self.point.dimensions(group);
         }
-        let mut state = hash(self.seed ^ (u64::from(self.index) << 32 | u64::from(group)));
+        let mut state = hash(self.pixel_seed ^ (u64::from(self.index) << 32 | u64::from(group)));
         std::array::from_fn(|_| {
             state = hash(state);
             // 24 bits fill the mantissa: never 1.
@@ -129,7 +138,7 @@ impl PathSampler {
 
     /// A number in 0..1 for something that has a number of its own on the way: independent of all others.
     pub fn of(&self, what: u64) -> f32 {
-        let state = hash(self.seed ^ hash(what ^ (u64::from(self.index) << 32 | u64::from(self.group))));
+        let state = hash(self.pixel_seed ^ hash(what ^ (u64::from(self.index) << 32 | u64::from(self.group))));
         (state >> 40) as f32 * (1.0 / 16_777_216.0)
     }
 }

@@ -99,11 +99,10 @@ impl Rectangle {
     }
 
     /// The solid angle where it is what is sampled.
-    fn seen(&self, p: DVec3) -> Option<Seen> {
+    fn seen(&self, p: DVec3, height: f64) -> Option<Seen> {
         if !self.is_right_angled {
             return None;
         }
-        let height = self.height(p)?;
         let corner = self.center - self.half[0] - self.half[1] - p;
         let (x0, y0) = (corner.dot(self.axes[0]), corner.dot(self.axes[1]));
         let (x, y) = ([x0, x0 + 2.0 * self.lengths[0]], [y0, y0 + 2.0 * self.lengths[1]]);
@@ -113,12 +112,12 @@ impl Rectangle {
 
     /// How large it looks from a point, steradian; `None` where that is little and from where it is dark.
     pub(in crate::lighting) fn solid_angle(&self, p: DVec3) -> Option<f64> {
-        self.seen(p).map(|seen| seen.solid_angle)
+        self.seen(p, self.height(p)?).map(|seen| seen.solid_angle)
     }
 
     pub(in crate::lighting) fn sample(&self, p: DVec3, u: [f64; 2]) -> Option<Toward> {
         let height = self.height(p)?;
-        let (to, by_angle) = match self.seen(p) {
+        let (to, by_angle) = match self.seen(p, height) {
             Some(seen) => {
                 let [x, y] = seen.point(u).map(|a| a * height.abs());
                 (x * self.axes[0] + y * self.axes[1] - height * self.normal, Some(1.0 / seen.solid_angle))
@@ -137,7 +136,7 @@ impl Rectangle {
     /// Of the direction that meets it at `distance`.
     pub(in crate::lighting) fn pdf(&self, p: DVec3, distance: f64) -> f64 {
         let Some(height) = self.height(p) else { return 0.0 };
-        self.seen(p).map_or_else(|| self.by_area(height, distance), |seen| 1.0 / seen.solid_angle)
+        self.seen(p, height).map_or_else(|| self.by_area(height, distance), |seen| 1.0 / seen.solid_angle)
     }
 
     /// distance² / (area · cos), where cos = height / distance.
