@@ -382,7 +382,7 @@ impl Mesh {
         origin: DVec3,
         direction: DVec3,
         time: f64,
-        start: Option<&Start<'_>>,
+        start: Option<&Start<'_, impl Fn() -> f64>>,
         limit: f64,
         found: impl FnMut(MeshHit) -> f64,
     ) {
@@ -400,14 +400,13 @@ impl Mesh {
     fn walk_points<C: Corner>(
         &self,
         (origin, direction, time): (DVec3, DVec3, f64),
-        start: Option<&Start<'_>>,
+        start: Option<&Start<'_, impl Fn() -> f64>>,
         limit: f64,
         point: impl Fn(u32) -> C,
         mut found: impl FnMut(MeshHit) -> f64,
     ) {
         let sheared = ShearedRay::new(origin, direction);
         let triangles = self.triangles.as_slice();
-        let from = start.map_or(0.0, |start| -behind(start.magnitude));
         let left = start.and_then(Start::left);
         let mut meet = |primitive: u32, limit: f64| {
             if left == Some(primitive) {
@@ -434,6 +433,7 @@ impl Mesh {
             (0..triangles.len() as u32).fold(limit, |limit, primitive| meet(primitive, limit));
             return;
         }
+        let from = start.map_or(0.0, |start| -behind((start.magnitude)()));
         self.tree.walk(origin, direction, from, limit, 1.0, meet);
     }
 

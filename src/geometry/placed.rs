@@ -123,6 +123,11 @@ impl Placed<'_> {
         mesh.may_meet(&Bounds { min: center - half, max: center + half })
     }
 
+    /// |L||v| + |t| at any point.
+    pub(super) fn largest_reach(&self) -> f64 {
+        self.reach_of(extent(self.shape))
+    }
+
     /// |L||v| + |t| at a primitive: what rounding a point of it in render space is relative to.
     pub(super) fn reach(&self, primitive: u32) -> f64 {
         let extent = match self.shape {
@@ -132,6 +137,11 @@ impl Placed<'_> {
         };
         self.reach_of(extent)
     }
+}
+
+/// |L||v| + |t| at any point of a shape under a transform to render space.
+pub(super) fn largest_reach(transform: &DAffine3, shape: &Shape) -> f64 {
+    norm(transform.matrix3) * extent(shape) + transform.translation.abs().max_element()
 }
 
 /// Bounds of a shape under a transform to render space whose rounding is enlarged `condition` times; outward by that.

@@ -37,14 +37,14 @@ pub(super) struct Met {
 }
 
 /// The start of a ray in the object space of an instance.
-pub(super) struct Start<'a> {
+pub(super) struct Start<'a, M> {
     pub(super) instance: u32,
     pub(super) crossings: &'a [Crossing],
     /// Render-space direction of the ray that arrived here, and the map from there.
     pub(super) arrival: DVec3,
     pub(super) inverse: &'a DMat3,
-    /// ‖L⁻¹‖ (|p| + |t| + reach + ‖L‖ |o|): the numbers that were rounded.
-    pub(super) magnitude: f64,
+    /// ‖L⁻¹‖ (|p| + |t| + reach + ‖L‖ |o|): the numbers that were rounded. Most candidates end before it is asked for.
+    pub(super) magnitude: M,
 }
 
 /// How far behind its start a ray looks, given the size of the numbers that were rounded.
@@ -52,7 +52,7 @@ pub(super) fn behind(magnitude: f64) -> f64 {
     BEHIND * magnitude
 }
 
-impl Start<'_> {
+impl<M: Fn() -> f64> Start<'_, M> {
     /// The direction of arrival in object space; its length does not matter.
     fn arrived(&self) -> DVec3 {
         *self.inverse * self.arrival
@@ -86,19 +86,20 @@ impl Start<'_> {
         let larger = |a: f64, b: f64| if a > b { a } else { b };
         let size = corners.iter().fold(0.0, |size, p| larger(p.abs().max_element(), size));
         // Most are far away, beyond doubt: |e1||e2| is at least the area. The rest takes roots and quotients.
-        let most = FAR * UNIT_ROUNDOFF * (START_ERRORS * self.magnitude + TRIANGLE_ERRORS * size);
+        let magnitude = (self.magnitude)();
+        let most = FAR * UNIT_ROUNDOFF * (START_ERRORS * magnitude + TRIANGLE_ERRORS * size);
         if raised * raised > most * most * (e1.length_squared() * e2.length_squared()) {
             return (hit.distance > 0.0).then_some(Met { distance: hit.distance, at_start: false });
         }
         let area = normal.length();
         let height = raised / area;
         let slenderness = e1.length() * e2.length() / area;
-        let error = UNIT_ROUNDOFF * (START_ERRORS * self.magnitude + TRIANGLE_ERRORS * size * slenderness);
+        let error = UNIT_ROUNDOFF * (START_ERRORS * magnitude + TRIANGLE_ERRORS * size * slenderness);
         if height > error {
             let at_start = height <= KEPT * error;
             return (hit.distance > 0.0).then_some(Met { distance: hit.distance, at_start });
         }
-        if hit.distance < -behind(self.magnitude) {
+        if hit.distance < -behind(magnitude) {
             return None;
         }
         let met = self.crosses_now(primitive, hit.leaving, corners, &corners_of).unwrap_or_else(|| {
@@ -147,7 +148,7 @@ impl Start<'_> {
         roots: Option<[f64; 2]>,
     ) -> Option<(Met, bool)> {
         let along = origin.dot(direction);
-        let error = UNIT_ROUNDOFF * START_ERRORS * self.magnitude;
+        let error = UNIT_ROUNDOFF * START_ERRORS * (self.magnitude)();
         let other_side = |distance: f64| {
             let height = distance * along.abs() / radius;
             (Met { distance, at_start: height <= KEPT * error }, true)
@@ -193,7 +194,7 @@ impl Start<'_> {
     /// If the ray stands on the solid, its side is known: from the last crossing, or, where that has yet to be made, from
     /// the way the ray arrived. What another surface here has done to the ray since may have turned it to the other side.
     pub(super) fn solid(&self, solid: &Solid, origin: DVec3, direction: DVec3) -> Option<(Met, Border)> {
-        let error = UNIT_ROUNDOFF * START_ERRORS * self.magnitude;
+        let error = UNIT_ROUNDOFF * START_ERRORS * (self.magnitude)();
         let standing = match self.last() {
             Some((crossing, is_last)) => Some((crossing.primitive, !crossing.outward, is_last)),
             None => solid
