@@ -27,6 +27,8 @@ const F32_STEP: f64 = 1.0 / 8_388_608.0;
 
 /// Entries of a stack for trees of eight levels, a few hundred to some thousand primitives.
 const SHALLOW: usize = stack_of(8);
+/// Of two levels.
+const FLAT: usize = stack_of(2);
 
 /// What waits on the stack: a node (`count` 0) or a leaf, and where the ray enters it.
 #[derive(Clone, Copy)]
@@ -65,6 +67,8 @@ impl Tree {
         // Clearing a stack that is never used takes longer than a step.
         if self.nodes.len() == 1 {
             self.walk_with(&mut [], origin, direction, start, limit, spread, visit);
+        } else if self.stack <= FLAT {
+            self.walk_with(&mut [WAITING; FLAT], origin, direction, start, limit, spread, visit);
         } else if self.stack <= SHALLOW {
             self.walk_with(&mut [WAITING; SHALLOW], origin, direction, start, limit, spread, visit);
         } else {

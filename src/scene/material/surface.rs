@@ -239,7 +239,17 @@ impl Tint {
         }
     }
 
+    /// Most tints of a surface are black or white.
+    #[inline(always)]
     fn at<const N: usize>(&self, found: Found<'_>, wavelengths: &Wavelengths<N>) -> SampledSpectrum<N> {
+        match self {
+            Self::Black => SampledSpectrum::ZERO,
+            Self::White => SampledSpectrum::ONE,
+            _ => self.spectrum(found, wavelengths),
+        }
+    }
+
+    fn spectrum<const N: usize>(&self, found: Found<'_>, wavelengths: &Wavelengths<N>) -> SampledSpectrum<N> {
         match self {
             Self::Black => SampledSpectrum::ZERO,
             Self::White => SampledSpectrum::ONE,
