@@ -8,6 +8,7 @@
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI};
 
+use crate::math::trig::sin_cos;
 use crate::spectrum::SampledSpectrum;
 
 /// Fujii's model at albedo 1.
@@ -101,6 +102,6 @@ impl<const N: usize> Diffuse<N> {
 #[inline]
 pub(super) fn sample_cosine([u, v]: [f32; 2]) -> Vec3 {
     let r = u.sqrt();
-    let phi = 2.0 * PI * v;
-    Vec3::new(r * libm::cosf(phi), r * libm::sinf(phi), (1.0 - u).max(0.0).sqrt())
+    let (sine, cosine) = sin_cos(std::f64::consts::TAU * f64::from(v));
+    Vec3::new(r * cosine as f32, r * sine as f32, (1.0 - u).max(0.0).sqrt())
 }

@@ -36,8 +36,15 @@ impl TreeSum {
     }
 
     /// Adds the sample with the next index.
+    #[inline]
     pub fn push(&mut self, value: f64) {
-        self.push_node(0, value);
+        if self.next & 1 == 0 {
+            // It closes nothing.
+            self.next += 1;
+            self.open.push((0, value));
+        } else {
+            self.push_node(0, value);
+        }
     }
 
     /// Adds a whole part: the finished sum over the next `count` indices, an aligned range.

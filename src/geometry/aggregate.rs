@@ -1,5 +1,6 @@
 //! All instances of a scene under one tree.
 
+use std::cell::OnceCell;
 use std::cmp::Ordering;
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use rayon::prelude::*;
 use super::departures::Crossing;
 use super::mesh::{Mesh, MeshHit};
 use super::motion::Pose;
-use super::placed::{Frame, ObjectRay, Placed, bounds_under, is_invertible};
+use super::placed::{Frame, ObjectRay, Placed, bounds_under, is_invertible, largest_reach};
 use super::start::{Met, Relation, Start, UNIT_ROUNDOFF, behind, relation};
 use super::tree::{Bounds, Tree};
 use super::{Departures, Hit, Instance, InstanceArray, Location, Numbering, Ray, Shape};
@@ -31,6 +32,8 @@ pub struct Aggregate {
     /// Largest condition and largest translation of all instances.
     spread: f64,
     farthest: f64,
+    /// |L||v| + |t| of all points of all instances: the largest.
+    reach: f64,
 }
 
 /// A single instance.
@@ -45,11 +48,32 @@ struct Extent {
     bounds: Bounds,
     condition: f64,
     farthest: f64,
+    /// |L||v| + |t| at most.
+    reach: f64,
+}
+
+/// A ray that starts on surfaces, and the size of the numbers that were rounded there, computed once somebody asks.
+struct Footing<'a> {
+    aggregate: &'a Aggregate,
+    ray: &'a Ray,
+    departures: &'a Departures,
+    magnitude: OnceCell<f64>,
+}
+
+impl Footing<'_> {
+    /// |p| + reach.
+    fn magnitude(&self) -> f64 {
+        *self
+            .magnitude
+            .get_or_init(|| self.ray.origin.abs().max_element() + self.aggregate.reach(self.ray, self.departures))
+    }
 }
 
 /// A moving transform is looked at at its samples and at quarters between them: its condition elsewhere may be this many times
 /// larger. An instance is not there at times at which it is worse: it is being flattened.
 const UNSEEN_CONDITION: f64 = 4.0;
+/// Room for the rounding of a few products.
+const MORE: f64 = 1.0 + 1e-9;
 
 impl Aggregate {
     /// Builds the tree over `instances` relative to `origin`, the point of the stage's world that is render space's zero.
@@ -84,15 +108,15 @@ impl Aggregate {
             instances: None,
             spread: 1.0,
             farthest: 0.0,
+            reach: 0.0,
         };
         let count = all.numbering.len();
         let in_tree: Vec<u32> = (0..count).into_par_iter().filter(|&i| all.extent_of(i).is_some()).collect();
         // The largest of some numbers does not depend on their grouping.
-        let (spread, farthest) = in_tree
+        (all.spread, all.farthest, all.reach) = in_tree
             .par_iter()
-            .filter_map(|&i| all.extent_of(i).map(|extent| (extent.condition, extent.farthest)))
-            .reduce(|| (1.0, 0.0), |a, b| (f64::max(a.0, b.0), f64::max(a.1, b.1)));
-        (all.spread, all.farthest) = (spread, farthest);
+            .filter_map(|&i| all.extent_of(i).map(|extent| (extent.condition, extent.farthest, extent.reach)))
+            .reduce(|| (1.0, 0.0, 0.0), |a, b| (f64::max(a.0, b.0), f64::max(a.1, b.1), f64::max(a.2, b.2)));
         all.instances = (in_tree.len() < count as usize).then_some(in_tree);
         let primitives = all.instances.as_ref().map_or(count as usize, Vec::len);
         all.tree = Tree::build(primitives, |i| {
@@ -149,6 +173,7 @@ impl Aggregate {
                 bounds: Placed { shape, frame, time: 0.0 }.bounds()?,
                 condition: frame.condition(),
                 farthest: frame.translation.abs().max_element(),
+                reach: Placed { shape, frame, time: 0.0 }.largest_reach(),
             })
         };
         match self.numbering.locate(instance) {
@@ -202,10 +227,12 @@ impl Aggregate {
             let Bounds { min, max } = bounds_under(&transform, shape, condition)?;
             let bounds = Bounds { min: min - rounding, max: max + rounding };
             let farthest = transform.translation.abs().max_element();
-            extent = Some(extent.map_or(Extent { bounds, condition, farthest }, |all| Extent {
+            let reach = largest_reach(&transform, shape);
+            extent = Some(extent.map_or(Extent { bounds, condition, farthest, reach }, |all| Extent {
                 bounds: all.bounds.union(&bounds),
                 condition,
                 farthest: all.farthest.max(farthest),
+                reach: all.reach.max(reach),
             }));
         }
         extent.filter(|extent| extent.bounds.reach().is_finite())
@@ -237,7 +264,14 @@ impl Aggregate {
     /// |L||v| + |t| at the surfaces that a ray stands on: the largest.
     fn reach(&self, ray: &Ray, departures: &Departures) -> f64 {
         let reach = |c: &Crossing| self.with(c.instance, ray.time, |placed| placed.reach(c.primitive));
-        departures.crossings().iter().filter_map(reach).fold(0.0, f64::max)
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        departures.crossings().iter().filter_map(reach).fold(0.0, larger)
+    }
+
+    /// Where a ray that starts on surfaces begins to look for them: behind its start by at least as much as any of them asks for.
+    fn looks_from(&self, ray: &Ray) -> f64 {
+        let magnitude = ray.origin.abs().max_element() + self.reach * MORE;
+        -behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest))
     }
 
     /// The nearest surface that the ray meets; equal distances are decided by (instance, primitive).
@@ -252,11 +286,11 @@ impl Aggregate {
                 nearest.limit
             });
         } else {
-            let magnitude = ray.origin.abs().max_element() + self.reach(ray, departures);
-            let from = -behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest));
+            let footing = Footing { aggregate: self, ray, departures, magnitude: OnceCell::new() };
+            let from = self.looks_from(ray);
             self.tree.walk(ray.origin, ray.direction, from, f64::INFINITY, self.spread, |i, _| {
                 let instance = self.instance(i);
-                let standing = Some((departures, magnitude));
+                let standing = Some(&footing);
                 self.with(instance, ray.time, |placed| placed.intersect(ray, instance, standing, &mut nearest));
                 nearest.limit
             });
@@ -275,12 +309,9 @@ impl Aggregate {
         limit: f64,
         mut blocks: impl FnMut(&Hit) -> bool,
     ) -> bool {
-        let (from, standing) = if departures.is_none() {
-            (0.0, None)
-        } else {
-            let magnitude = ray.origin.abs().max_element() + self.reach(ray, departures);
-            (-behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest)), Some((departures, magnitude)))
-        };
+        let footing = Footing { aggregate: self, ray, departures, magnitude: OnceCell::new() };
+        let standing = Some(&footing).filter(|_| !departures.is_none());
+        let from = if standing.is_some() { self.looks_from(ray) } else { 0.0 };
         let mut is_blocked = false;
         self.tree.walk(ray.origin, ray.direction, from, limit, self.spread, |i, _| {
             let instance = self.instance(i);
@@ -296,13 +327,13 @@ impl Aggregate {
     /// A surface of an instance that `is_member`, which passes through the start of the ray, within rounding, and which the
     /// ray has not crossed there. Casts no further than that.
     pub fn coincident(&self, ray: &Ray, departures: &Departures, is_member: impl Fn(u32) -> bool) -> Option<Hit> {
-        let magnitude = ray.origin.abs().max_element() + self.reach(ray, departures);
-        let about = behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest));
+        let footing = Footing { aggregate: self, ray, departures, magnitude: OnceCell::new() };
+        let about = behind(self.spread * (2.0 * footing.magnitude() + 2.0 * self.farthest));
         let mut nearest = Nearest { hit: None, limit: about };
         self.tree.walk(ray.origin, ray.direction, -about, about, self.spread, |i, _| {
             let instance = self.instance(i);
             if is_member(instance) {
-                let standing = Some((departures, magnitude));
+                let standing = Some(&footing);
                 self.with(instance, ray.time, |placed| placed.intersect(ray, instance, standing, &mut nearest));
             }
             nearest.limit
@@ -324,6 +355,10 @@ impl Aggregate {
 
     /// The hit point, on the surface to rounding, and the surface around it.
     pub fn local_surface(&self, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
+        // The common case by itself: the answer is long, and written once.
+        if let Some((shape, Standing::Still(frame))) = self.singles.get(hit.instance as usize) {
+            return Placed { shape, frame, time: ray.time }.local_surface(ray, hit);
+        }
         self.with(hit.instance, ray.time, |placed| placed.local_surface(ray, hit)).expect("it was met at this time")
     }
 
@@ -525,16 +560,27 @@ impl ObjectRay {
 impl Placed<'_> {
     /// What a ray that stands on surfaces knows of them in this object's space.
     fn start<'d>(
-        &self,
-        object: &ObjectRay,
+        &'d self,
+        object: &'d ObjectRay,
         instance: u32,
-        standing: Option<(&'d Departures, f64)>,
-    ) -> Option<Start<'d>> {
-        standing.map(|(departures, magnitude)| Start {
+        standing: Option<&'d Footing<'_>>,
+    ) -> Option<Start<'d, impl Fn() -> f64>> {
+        standing.map(|footing| Start {
             instance,
-            crossings: departures.crossings(),
-            arrival: self.inverse * departures.arrival(),
-            magnitude: self.start_magnitude(magnitude, object),
+            crossings: footing.departures.crossings(),
+            arrival: footing.departures.arrival(),
+            inverse: &self.frame.inverse,
+            magnitude: move || self.start_magnitude(footing.magnitude(), object),
+        })
+    }
+
+    /// Whether the ray has just left a sheet, which it cannot meet.
+    #[inline]
+    fn is_behind(&self, instance: u32, object: &ObjectRay, standing: Option<&Footing<'_>>) -> bool {
+        let last = standing.and_then(|footing| footing.departures.crossings().last());
+        last.is_some_and(|last| {
+            last.instance == instance
+                && matches!(self.shape, Shape::Mesh(mesh) if mesh.is_behind(last.outward, object.direction))
         })
     }
 
@@ -543,7 +589,7 @@ impl Placed<'_> {
         &self,
         ray: &Ray,
         instance: u32,
-        standing: Option<(&Departures, f64)>,
+        standing: Option<&Footing<'_>>,
         limit: f64,
         blocks: &mut dyn FnMut(&Hit) -> bool,
     ) -> bool {
@@ -563,6 +609,9 @@ impl Placed<'_> {
             });
         };
         let object = self.ray(ray);
+        if self.is_behind(instance, &object, standing) {
+            return false;
+        }
         let start = self.start(&object, instance, standing);
         let limit = limit * object.stretch;
         let mut is_blocked = false;
@@ -573,8 +622,11 @@ impl Placed<'_> {
         is_blocked
     }
 
-    fn intersect(&self, ray: &Ray, instance: u32, standing: Option<(&Departures, f64)>, nearest: &mut Nearest) {
+    fn intersect(&self, ray: &Ray, instance: u32, standing: Option<&Footing<'_>>, nearest: &mut Nearest) {
         let object = self.ray(ray);
+        if self.is_behind(instance, &object, standing) {
+            return;
+        }
         let start = self.start(&object, instance, standing);
         match self.shape {
             Shape::Mesh(mesh) => {
@@ -623,10 +675,13 @@ impl Placed<'_> {
     fn crossings(&self, ray: &Ray, instance: u32, f: &mut dyn FnMut(&Hit)) {
         let object = self.ray(ray);
         match self.shape {
-            Shape::Mesh(mesh) => mesh.walk(object.origin, object.direction, ray.time, None, f64::INFINITY, |hit| {
-                f(&object.hit(instance, &hit));
-                f64::INFINITY
-            }),
+            Shape::Mesh(mesh) => {
+                let nowhere = None::<&Start<'_, fn() -> f64>>;
+                mesh.walk(object.origin, object.direction, ray.time, nowhere, f64::INFINITY, |hit| {
+                    f(&object.hit(instance, &hit));
+                    f64::INFINITY
+                });
+            }
             Shape::Sphere(sphere) => {
                 for (root, leaving) in
                     sphere.roots(object.origin, object.direction).into_iter().flatten().zip([false, true])

@@ -9,7 +9,7 @@ use super::Buffer;
 use super::cut::{Corners, Cut, is_sliver, uncut};
 use super::motion::{Between, Deformation, Deformed};
 use super::polygons::{NamedPrimvar, PolygonMesh, PrimvarView};
-use super::start::{Start, behind};
+use super::start::{Relation, Start, behind, relation};
 use super::subdivision::{Refined, Refiner};
 use super::topology;
 use super::tree::{Bounds, Tree};
@@ -18,6 +18,10 @@ use crate::Result;
 
 /// Normals that differ from the facet's by less are the facet's, computed by an exporter in f32: sixteen of its steps.
 const FLAT: f64 = 16.0 / 16_777_216.0;
+/// Of so few triangles a ray asks every one: that takes no longer than to get ready for the tree.
+const FEW: usize = 4;
+/// Sine of an angle between a ray and a plane that no rounding turns round.
+const GRAZING: f64 = 1e-9;
 
 /// Triangles over authored points, with the tree over them.
 #[derive(Debug)]
@@ -36,6 +40,8 @@ pub struct Mesh {
     slots: Option<Vec<u16>>,
     tree: Tree,
     bounds: Bounds,
+    /// The normal of all triangles, if they are few, lie in one plane and face the same way.
+    sheet: Option<DVec3>,
 }
 
 /// What was found when a mesh was made.
@@ -244,7 +250,9 @@ impl Mesh {
             slots,
             tree,
             bounds,
+            sheet: None,
         };
+        mesh.sheet = mesh.find_sheet();
         mesh.settle_normals();
         report.normals_reversed = mesh.normals_reversed;
         (mesh, report)
@@ -286,10 +294,23 @@ impl Mesh {
     }
 
     /// The moved points at a time; `None` where the mesh has its own.
+    #[inline]
     fn deformed(&self, time: f64) -> Option<Deformed<'_>> {
         if time == 0.0 { None } else { self.deformation.as_ref().map(|deformation| deformation.at(time)) }
     }
 
+    /// Largest coordinate of a triangle.
+    pub(super) fn reach(&self, primitive: u32, time: f64) -> f64 {
+        match self.deformed(time) {
+            None => {
+                let larger = |reach: f32, x: &f32| if x.abs() > reach { x.abs() } else { reach };
+                self.corners_f32(primitive).as_flattened().iter().fold(0.0, larger).into()
+            }
+            Some(_) => self.corners(primitive, time).iter().map(|p| p.abs().max_element()).fold(0.0, f64::max),
+        }
+    }
+
+    #[inline]
     pub(crate) fn corners(&self, primitive: u32, time: f64) -> [DVec3; 3] {
         match self.deformed(time) {
             None => self.corners_f32(primitive).map(widen),
@@ -361,7 +382,7 @@ impl Mesh {
         origin: DVec3,
         direction: DVec3,
         time: f64,
-        start: Option<&Start<'_>>,
+        start: Option<&Start<'_, impl Fn() -> f64>>,
         limit: f64,
         found: impl FnMut(MeshHit) -> f64,
     ) {
@@ -379,23 +400,27 @@ impl Mesh {
     fn walk_points<C: Corner>(
         &self,
         (origin, direction, time): (DVec3, DVec3, f64),
-        start: Option<&Start<'_>>,
+        start: Option<&Start<'_, impl Fn() -> f64>>,
         limit: f64,
         point: impl Fn(u32) -> C,
         mut found: impl FnMut(MeshHit) -> f64,
     ) {
         let sheared = ShearedRay::new(origin, direction);
         let triangles = self.triangles.as_slice();
-        let from = start.map_or(0.0, |start| -behind(start.magnitude));
-        self.tree.walk(origin, direction, from, limit, 1.0, |primitive, limit| {
+        let left = start.and_then(Start::left);
+        let mut meet = |primitive: u32, limit: f64| {
+            if left == Some(primitive) {
+                return limit;
+            }
             let corners = triangles[primitive as usize].map(&point);
             let Some(hit) = sheared.intersect(corners) else { return limit };
             let (distance, at_start) = match start {
                 None if hit.distance > 0.0 => (hit.distance, false),
                 None => return limit,
                 Some(start) => {
-                    let relative = |primitive| self.corners(primitive, time).map(|p| p - origin);
-                    match start.triangle(primitive, &hit, direction, relative(primitive), relative) {
+                    let relative = corners.map(|p| p.wide() - origin);
+                    let relative_of = |primitive| self.corners(primitive, time).map(|p| p - origin);
+                    match start.triangle(primitive, &hit, direction, relative, relative_of) {
                         Some(met) => (met.distance, met.at_start),
                         None => return limit,
                     }
@@ -403,7 +428,13 @@ impl Mesh {
             };
             let TriangleHit { barycentric, leaving, .. } = hit;
             found(MeshHit { primitive, distance, barycentric, leaving, at_start })
-        });
+        };
+        if triangles.len() <= FEW {
+            (0..triangles.len() as u32).fold(limit, |limit, primitive| meet(primitive, limit));
+            return;
+        }
+        let from = start.map_or(0.0, |start| -behind((start.magnitude)()));
+        self.tree.walk(origin, direction, from, limit, 1.0, meet);
     }
 
     /// Calls `found` with every crossing at a distance > 0, asking every triangle.
@@ -419,9 +450,32 @@ impl Mesh {
         }
     }
 
+    #[inline]
     fn corners_f32(&self, primitive: u32) -> [[f32; 3]; 3] {
         let points = self.points.as_slice();
         self.triangles[primitive as usize].map(|p| points[p as usize])
+    }
+
+    fn find_sheet(&self) -> Option<DVec3> {
+        if self.deformation.is_some() || self.is_empty() || self.len() > FEW {
+            return None;
+        }
+        let corners = |primitive: usize| self.corners(primitive as u32, 0.0);
+        let is_sheet = |(i, j): (usize, usize)| {
+            [true, false].into_iter().all(|outward| relation(corners(i), corners(j), outward) == Relation::SameSheet)
+        };
+        let [a, b, c] = corners(0);
+        let pairs = (0..self.len()).flat_map(|i| (0..self.len()).map(move |j| (i, j)));
+        pairs.filter(|(i, j)| i != j).all(is_sheet).then(|| (b - a).cross(c - a).normalize())
+    }
+
+    /// Whether a ray that has left a triangle on this side, whatever else it stands on, cannot meet the mesh: it is one sheet, and
+    /// the ray runs away from it, beyond doubt.
+    pub(super) fn is_behind(&self, outward: bool, direction: DVec3) -> bool {
+        self.sheet.is_some_and(|normal| {
+            let rise = normal.dot(direction);
+            if outward { rise > GRAZING } else { rise < -GRAZING }
+        })
     }
 
     /// Drops normals that say nothing, and finds out which way the others point.

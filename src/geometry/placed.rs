@@ -41,6 +41,8 @@ pub(super) struct Frame {
     pub(super) similarity: Option<f64>,
     norm: f64,
     inverse_norm: f64,
+    /// Largest coordinate of the translation.
+    offset: f64,
 }
 
 /// A ray in object space.
@@ -65,6 +67,7 @@ impl Frame {
             similarity: similarity(linear),
             norm: norm(linear),
             inverse_norm: norm(inverse),
+            offset: (translation - origin).abs().max_element(),
         }
     }
 
@@ -75,13 +78,13 @@ impl Frame {
 
     /// |L||v| + |t| for coordinates up to `extent`.
     fn reach_of(&self, extent: f64) -> f64 {
-        self.norm * extent + self.translation.abs().max_element()
+        self.norm * extent + self.offset
     }
 
     /// The size of the numbers rounded on the way of a ray's start to object space (`start.rs`). `magnitude` is |p| + reach
     /// in render space.
     pub(super) fn start_magnitude(&self, magnitude: f64, ray: &ObjectRay) -> f64 {
-        let there = magnitude + self.translation.abs().max_element() + self.norm * ray.origin.abs().max_element();
+        let there = magnitude + self.offset + self.norm * ray.origin.abs().max_element();
         self.inverse_norm * there
     }
 
@@ -120,18 +123,25 @@ impl Placed<'_> {
         mesh.may_meet(&Bounds { min: center - half, max: center + half })
     }
 
+    /// |L||v| + |t| at any point.
+    pub(super) fn largest_reach(&self) -> f64 {
+        self.reach_of(extent(self.shape))
+    }
+
     /// |L||v| + |t| at a primitive: what rounding a point of it in render space is relative to.
     pub(super) fn reach(&self, primitive: u32) -> f64 {
         let extent = match self.shape {
             Shape::Sphere(sphere) => sphere.radius(),
             Shape::Solid(solid) => solid.extent(),
-            Shape::Mesh(mesh) => {
-                let corners = mesh.corners(primitive, self.time);
-                corners.into_iter().map(|p| p.abs().max_element()).fold(0.0, f64::max)
-            }
+            Shape::Mesh(mesh) => mesh.reach(primitive, self.time),
         };
         self.reach_of(extent)
     }
+}
+
+/// |L||v| + |t| at any point of a shape under a transform to render space.
+pub(super) fn largest_reach(transform: &DAffine3, shape: &Shape) -> f64 {
+    norm(transform.matrix3) * extent(shape) + transform.translation.abs().max_element()
 }
 
 /// Bounds of a shape under a transform to render space whose rounding is enlarged `condition` times; outward by that.

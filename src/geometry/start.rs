@@ -8,7 +8,7 @@
 //! largest |L||v| + |t| of the surfaces that the ray stands on. The test of a triangle errs by its projected size over its
 //! area: in distance from the plane by less than 8 u · size · |e1||e2| / |e1 × e2|.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::departures::Crossing;
 use super::solid::{Border, Solid};
@@ -23,6 +23,8 @@ const TRIANGLE_ERRORS: f64 = 8.0;
 /// Crossings are kept while the ray has not left their place by more than this many bounds: further than what counts as
 /// here, so that a surface just crossed is not taken for one that is still to come.
 const KEPT: f64 = 4.0;
+/// The same with room for rounding: what is higher than this many bounds is not here.
+const FAR: f64 = 5.0;
 /// A surface may cut the ray behind its start, by rounding: at most by half the digits, where a grazing ray makes the
 /// bound on the distance from the plane a long way along the ray.
 const BEHIND: f64 = 1.0 / 67_108_864.0;
@@ -35,13 +37,14 @@ pub(super) struct Met {
 }
 
 /// The start of a ray in the object space of an instance.
-pub(super) struct Start<'a> {
+pub(super) struct Start<'a, M> {
     pub(super) instance: u32,
     pub(super) crossings: &'a [Crossing],
-    /// Direction of the ray that arrived here; its length does not matter.
+    /// Render-space direction of the ray that arrived here, and the map from there.
     pub(super) arrival: DVec3,
-    /// ‖L⁻¹‖ (|p| + |t| + reach + ‖L‖ |o|): the numbers that were rounded.
-    pub(super) magnitude: f64,
+    pub(super) inverse: &'a DMat3,
+    /// ‖L⁻¹‖ (|p| + |t| + reach + ‖L‖ |o|): the numbers that were rounded. Most candidates end before it is asked for.
+    pub(super) magnitude: M,
 }
 
 /// How far behind its start a ray looks, given the size of the numbers that were rounded.
@@ -49,15 +52,25 @@ pub(super) fn behind(magnitude: f64) -> f64 {
     BEHIND * magnitude
 }
 
-impl Start<'_> {
+impl<M: Fn() -> f64> Start<'_, M> {
+    /// The direction of arrival in object space; its length does not matter.
+    fn arrived(&self) -> DVec3 {
+        *self.inverse * self.arrival
+    }
+
     /// The last crossing of this instance here, and whether it is the last of all.
     fn last(&self) -> Option<(Crossing, bool)> {
         let index = self.crossings.iter().rposition(|c| c.instance == self.instance)?;
         Some((self.crossings[index], index + 1 == self.crossings.len()))
     }
 
-    /// Whether a triangle that the ray's line crosses is met. `corners` are relative to the start; `corners_of` gives those
-    /// of another triangle of the mesh.
+    /// The primitive of this instance that the ray has left last, if no other instance was left since: it is not met here.
+    pub(super) fn left(&self) -> Option<u32> {
+        self.crossings.last().filter(|crossing| crossing.instance == self.instance).map(|crossing| crossing.primitive)
+    }
+
+    /// Whether a triangle that the ray's line crosses is met, which is not the one that it has [left](Self::left). `corners` are
+    /// relative to the start; `corners_of` gives those of another triangle of the mesh.
     pub(super) fn triangle(
         &self,
         primitive: u32,
@@ -66,29 +79,32 @@ impl Start<'_> {
         corners: [DVec3; 3],
         corners_of: impl Fn(u32) -> [DVec3; 3],
     ) -> Option<Met> {
-        if let Some((crossing, true)) = self.last()
-            && crossing.primitive == primitive
-        {
-            return None;
-        }
         let [a, b, c] = corners;
         let (e1, e2) = (b - a, c - a);
         let normal = e1.cross(e2);
+        let raised = (hit.distance * direction.dot(normal)).abs();
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        let size = corners.iter().fold(0.0, |size, p| larger(p.abs().max_element(), size));
+        // Most are far away, beyond doubt: |e1||e2| is at least the area. The rest takes roots and quotients.
+        let magnitude = (self.magnitude)();
+        let most = FAR * UNIT_ROUNDOFF * (START_ERRORS * magnitude + TRIANGLE_ERRORS * size);
+        if raised * raised > most * most * (e1.length_squared() * e2.length_squared()) {
+            return (hit.distance > 0.0).then_some(Met { distance: hit.distance, at_start: false });
+        }
         let area = normal.length();
-        let height = (hit.distance * direction.dot(normal)).abs() / area;
-        let size = corners.map(|p| p.abs().max_element()).into_iter().fold(0.0, f64::max);
+        let height = raised / area;
         let slenderness = e1.length() * e2.length() / area;
-        let error = UNIT_ROUNDOFF * (START_ERRORS * self.magnitude + TRIANGLE_ERRORS * size * slenderness);
+        let error = UNIT_ROUNDOFF * (START_ERRORS * magnitude + TRIANGLE_ERRORS * size * slenderness);
         if height > error {
             let at_start = height <= KEPT * error;
             return (hit.distance > 0.0).then_some(Met { distance: hit.distance, at_start });
         }
-        if hit.distance < -behind(self.magnitude) {
+        if hit.distance < -behind(magnitude) {
             return None;
         }
         let met = self.crosses_now(primitive, hit.leaving, corners, &corners_of).unwrap_or_else(|| {
             // Not crossed when the ray arrived, so it is crossed now if the ray still goes the way it came.
-            let arriving = self.arrival.dot(normal);
+            let arriving = self.arrived().dot(normal);
             if hit.leaving { arriving > 0.0 } else { arriving < 0.0 }
         });
         met.then_some(Met { distance: hit.distance.max(0.0), at_start: true })
@@ -132,7 +148,7 @@ impl Start<'_> {
         roots: Option<[f64; 2]>,
     ) -> Option<(Met, bool)> {
         let along = origin.dot(direction);
-        let error = UNIT_ROUNDOFF * START_ERRORS * self.magnitude;
+        let error = UNIT_ROUNDOFF * START_ERRORS * (self.magnitude)();
         let other_side = |distance: f64| {
             let height = distance * along.abs() / radius;
             (Met { distance, at_start: height <= KEPT * error }, true)
@@ -156,7 +172,7 @@ impl Start<'_> {
             };
         }
         if (origin.length() - radius).abs() <= error {
-            let arriving = self.arrival.dot(origin);
+            let arriving = self.arrived().dot(origin);
             if along > 0.0 && arriving > 0.0 {
                 return here(true);
             }
@@ -178,12 +194,12 @@ impl Start<'_> {
     /// If the ray stands on the solid, its side is known: from the last crossing, or, where that has yet to be made, from
     /// the way the ray arrived. What another surface here has done to the ray since may have turned it to the other side.
     pub(super) fn solid(&self, solid: &Solid, origin: DVec3, direction: DVec3) -> Option<(Met, Border)> {
-        let error = UNIT_ROUNDOFF * START_ERRORS * self.magnitude;
+        let error = UNIT_ROUNDOFF * START_ERRORS * (self.magnitude)();
         let standing = match self.last() {
             Some((crossing, is_last)) => Some((crossing.primitive, !crossing.outward, is_last)),
             None => solid
                 .piece_at(origin, error, |_| true)
-                .map(|primitive| (primitive, self.arrival.dot(solid.piece(primitive, origin).gradient) > 0.0, false)),
+                .map(|primitive| (primitive, self.arrived().dot(solid.piece(primitive, origin).gradient) > 0.0, false)),
         };
         let border = match standing {
             None => solid.borders(origin, direction, None).ahead()?,

@@ -25,8 +25,6 @@ impl Placed<'_> {
     fn facet(&self, mesh: &Mesh, hit: &Hit) -> (DVec3, LocalSurface) {
         let corners = mesh.corners(hit.primitive, self.time);
         let [a, b, c] = corners.map(|p| self.point(p));
-        // Edges from object space: there they are exact, while corners far from render space's zero are rounded.
-        let (e1, e2) = (self.linear * (corners[1] - corners[0]), self.linear * (corners[2] - corners[0]));
         let [v, w] = hit.barycentric;
         let point = (1.0 - v - w) * a + v * b + w * c;
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -44,6 +42,8 @@ impl Placed<'_> {
             if d1 == DVec3::ZERO && d2 == DVec3::ZERO {
                 return Some(LocalSurface { n_s, ..flat });
             }
+            // Edges from object space: there they are exact, while corners far from render space's zero are rounded.
+            let (e1, e2) = (self.linear * (corners[1] - corners[0]), self.linear * (corners[2] - corners[0]));
             let m = e1.cross(e2);
             // ∇β1 and ∇β2, so that β1(q − a) = ∇β1·(q − a).
             let (g1, g2) = (e2.cross(m) / m.length_squared(), m.cross(e1) / m.length_squared());

@@ -35,6 +35,11 @@ pub(crate) enum Axis {
 /// A corner as it is stored, or as it is computed where points move.
 pub(crate) trait Corner: Copy {
     fn along(self, axis: Axis) -> f64;
+
+    #[inline(always)]
+    fn wide(self) -> DVec3 {
+        DVec3::new(self.along(Axis::X), self.along(Axis::Y), self.along(Axis::Z))
+    }
 }
 
 impl Corner for &[f32; 3] {

@@ -3,13 +3,13 @@
 //! The slab test must never miss a box in which the f64 shape test finds a hit. In the units of the boxes (all
 //! coordinates ≤ 1 in size) the errors are:
 //!
-//! * The origin. It is moved in f64 to where the ray enters the bounds of everything, so it is ≤ 1 in size before it is
-//!   rounded. The move errs by a few 2^-53 (|o| + 1), as does the shape test, which works with the origin as given: 2^-49
+//! * The origin. It is moved in f64 to where the ray enters the bounds of everything, unless it is near them, so it is ≤ 2 in
+//!   size before it is rounded. The move errs by a few 2^-53 (|o| + 1), as does the shape test, which works with the origin as given: 2^-49
 //!   (|o| + 1) bounds both, times the caller's `spread` where the shape test has its own space. The padded origin is
 //!   rounded up for the near planes of positive directions and far planes of negative ones, down for the others, each by
 //!   a whole step of f32 so that no rounding needs to be looked at; what underflows, the padding covers.
 //! * The direction. Components below 2^-64 are replaced by ±2^-64, so that 1/d is finite and 0·∞ cannot arise; over a
-//!   distance of 4, more than the diagonal, that moves the ray by 2^-62, which the padding of 2^-40 covers.
+//!   distance of 8, more than the diagonal and the way there, that moves the ray by 2^-61, which the padding of 2^-40 covers.
 //! * The distances. 1/d, the difference and the product err by 2^-24 relatively, together (1 + 2^-24)^3: multiplying far
 //!   distances by 1 + 2^-21 covers both sides of the comparison and the rounding of the limit (Ize 2013, "Robust BVH ray traversal", JCGT 2(2)).
 //!   The relative error cannot change a sign, and distances below 0 are behind the start.
@@ -27,6 +27,8 @@ const F32_STEP: f64 = 1.0 / 8_388_608.0;
 
 /// Entries of a stack for trees of eight levels, a few hundred to some thousand primitives.
 const SHALLOW: usize = stack_of(8);
+/// Of two levels.
+const FLAT: usize = stack_of(2);
 
 /// What waits on the stack: a node (`count` 0) or a leaf, and where the ray enters it.
 #[derive(Clone, Copy)]
@@ -35,6 +37,8 @@ struct Waiting {
     first: u32,
     count: u32,
 }
+
+const WAITING: Waiting = Waiting { near: 0.0, first: 0, count: 0 };
 
 /// The ray in the units of the boxes.
 struct Slabs {
@@ -60,17 +64,22 @@ impl Tree {
         spread: f64,
         visit: impl FnMut(u32, f64) -> f64,
     ) {
-        // Most trees are shallow, and clearing a stack that is never used takes longer than a step.
-        if self.stack <= SHALLOW {
-            self.walk_with::<SHALLOW>(origin, direction, start, limit, spread, visit);
+        // Clearing a stack that is never used takes longer than a step.
+        if self.nodes.len() == 1 {
+            self.walk_with(&mut [], origin, direction, start, limit, spread, visit);
+        } else if self.stack <= FLAT {
+            self.walk_with(&mut [WAITING; FLAT], origin, direction, start, limit, spread, visit);
+        } else if self.stack <= SHALLOW {
+            self.walk_with(&mut [WAITING; SHALLOW], origin, direction, start, limit, spread, visit);
         } else {
-            self.walk_with::<STACK>(origin, direction, start, limit, spread, visit);
+            self.walk_with(&mut [WAITING; STACK], origin, direction, start, limit, spread, visit);
         }
     }
 
-    #[inline(always)]
-    fn walk_with<const STACK: usize>(
+    #[expect(clippy::too_many_arguments, reason = "those of `walk`, and memory")]
+    fn walk_with(
         &self,
+        stack: &mut [Waiting],
         origin: DVec3,
         direction: DVec3,
         start: f64,
@@ -91,36 +100,60 @@ impl Tree {
         let sized = |d: f64| if d.abs() < SMALLEST_DIRECTION { SMALLEST_DIRECTION.copysign(d) } else { d };
         let direction = DVec3::new(sized(direction.x), sized(direction.y), sized(direction.z));
         let inverse = direction.recip();
-        let to_min = (self.bounds[0] - padding - origin) * inverse;
-        let to_max = (self.bounds[1] + padding - origin) * inverse;
-        let enter = to_min.min(to_max).max_element().max(start * scale);
-        let exit = to_min.max(to_max).min_element();
         let mut limit = limit;
-        if !(enter <= exit * FAR_FACTOR + padding && enter <= limit * scale + padding) {
-            return;
+        let mut enter = start * scale;
+        // From within or nearby, the boxes of the first node are all that can be missed.
+        if origin.abs().max_element() > 1.0 || enter < -1.0 {
+            let to_min = (self.bounds[0] - padding - origin) * inverse;
+            let to_max = (self.bounds[1] + padding - origin) * inverse;
+            enter = to_min.min(to_max).max_element().max(enter);
+            let exit = to_min.max(to_max).min_element();
+            if !(enter <= exit * FAR_FACTOR + padding && enter <= limit * scale + padding) {
+                return;
+            }
         }
         let moved = origin + direction * enter;
         let (low, high) = (moved - padding, moved + padding);
-        let (low, high) = ((low - low.abs() * F32_STEP).as_vec3(), (high + high.abs() * F32_STEP).as_vec3());
-        let mut slabs = Slabs {
-            negative: [0; 3],
-            inverse: [Vec4::ZERO; 3],
-            near_origin: [Vec4::ZERO; 3],
-            far_origin: [Vec4::ZERO; 3],
+        let (low, high) = (low - low.abs() * F32_STEP, high + high.abs() * F32_STEP);
+        let (low, high) = (low.as_vec3().extend(0.0), high.as_vec3().extend(0.0));
+        let inverse = inverse.as_vec3().extend(0.0);
+        let negative = inverse.cmplt(Vec4::ZERO);
+        let (near, far) = (Vec4::select(negative, low, high), Vec4::select(negative, high, low));
+        let splat = |v: Vec4| [Vec4::splat(v.x), Vec4::splat(v.y), Vec4::splat(v.z)];
+        let slabs = Slabs {
+            negative: [inverse.x < 0.0, inverse.y < 0.0, inverse.z < 0.0].map(usize::from),
+            inverse: splat(inverse),
+            near_origin: splat(near),
+            far_origin: splat(far),
         };
-        for axis in 0..3 {
-            let negative = inverse[axis] < 0.0;
-            slabs.negative[axis] = usize::from(negative);
-            slabs.inverse[axis] = Vec4::splat(inverse[axis] as f32);
-            let (near, far) = if negative { (low, high) } else { (high, low) };
-            slabs.near_origin[axis] = Vec4::splat(near[axis]);
-            slabs.far_origin[axis] = Vec4::splat(far[axis]);
-        }
         // Distances from the moved origin.
         let reach = |limit: f64| ((limit * scale - enter) * FAR_FACTOR + padding) as f32;
         let mut farthest = reach(limit);
 
-        let mut stack = [Waiting { near: 0.0, first: 0, count: 0 }; STACK];
+        // A few primitives are in one node: nothing has to wait on a stack.
+        if let [node] = &self.nodes[..] {
+            let (near, mut lanes) = slabs.entries(node, farthest);
+            while lanes != 0 {
+                let mut lane = (lanes.trailing_zeros() & 3) as usize;
+                let mut others = lanes & (lanes - 1);
+                while others != 0 {
+                    let other = (others.trailing_zeros() & 3) as usize;
+                    lane = if near[other] < near[lane] { other } else { lane };
+                    others &= others - 1;
+                }
+                lanes &= !(1 << lane);
+                if near[lane] > farthest {
+                    return;
+                }
+                let (first, count) = (node.first[lane] as usize, node.count[lane] as usize);
+                for &primitive in &self.order[first..first + count] {
+                    limit = visit(primitive, limit);
+                }
+                farthest = reach(limit);
+            }
+            return;
+        }
+
         let mut len = 1;
         while len > 0 {
             len -= 1;

@@ -228,7 +228,7 @@ impl<'a> Follower<'a> {
                 momentum = medium.ior * start.direction;
                 (chain.start_medium, chain.columns) = (medium, C::start(start, &medium));
             }
-            let Some(met) = met else { break };
+            let Some(mut met) = met else { break };
             let cut_out = met.presence == Presence::Absent;
             if !cut_out && chain.first.is_none() {
                 chain.first = Some(met);
@@ -241,7 +241,7 @@ impl<'a> Follower<'a> {
                 }
                 continue;
             }
-            let met = walk.in_contact(met, counters);
+            walk.in_contact(&mut met, counters);
             let transfer = Transfer {
                 distance: walk.travelled,
                 direction: walk.ray.direction,

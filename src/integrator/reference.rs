@@ -133,7 +133,7 @@ impl<'a> BruteForce<'a> {
                 radiance += throughput * through(light.distance) * light.radiance.hero();
             });
             let alpha = f64::from(u8::from(vertices > 0));
-            let Some(met) = met else {
+            let Some(mut met) = met else {
                 lighting.environment(&ray, wavelengths, &mut |light| {
                     if !is_linked(light.light) {
                         return;
@@ -143,7 +143,7 @@ impl<'a> BruteForce<'a> {
                 return (radiance, alpha);
             };
             throughput *= through(limit);
-            let met = walk.in_contact(met, &mut self.counters);
+            walk.in_contact(&mut met, &mut self.counters);
             let inside = task.view.inside(&met.hit, met.material_id);
             let mut far = inside.map(|_| walk.far_side(&met, &mut self.counters));
             let far_medium = far.as_ref().map_or(medium, |far| self.media.of(far.medium));

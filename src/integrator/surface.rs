@@ -33,13 +33,17 @@ pub(super) fn at<const N: usize>(
     interface: Interface<N>,
 ) -> Met<N> {
     let at = view.surface(&met.hit, met.material_id, wavelengths, interface);
-    let frame = view.shading_frame(&met.hit, ray.time, &met.surface, &at);
+    let (mut normal, mut tangent) = (met.surface.n_s, None);
+    if at.has_direction() {
+        let frame = view.shading_frame(&met.hit, ray.time, &met.surface, &at);
+        (normal, tangent) = (frame.normal, Some(frame.tangent));
+    }
     let parameters = at.parameters;
     Met {
         parameters,
         presence: at.presence,
-        normal: frame.normal,
-        tangent: at.has_direction().then_some(frame.tangent),
+        normal,
+        tangent,
         transmits: parameters.transmission > 0.0 || !parameters.diffuse_transmission.is_black(),
     }
 }

@@ -93,17 +93,19 @@ impl<'a> Walk<'a> {
             let (point, surface) = self.view.aggregate.local_surface(&self.ray, &hit);
             self.travelled += hit.distance;
             let material_id = self.view.material_id(&hit);
-            let met = SurfacePoint { hit, point, surface, material_id, presence: Presence::AsStated };
-            let seen = |met: SurfacePoint| SurfacePoint { presence: self.view.presence(&met.hit, material_id), ..met };
-            let Some(sight) = self.sight else { return Some(seen(met)) };
-            if self.travelled > sight.far {
-                counters.unseen += 1;
-                return None;
+            let is_seen = match self.sight {
+                Some(sight) if self.travelled > sight.far => {
+                    counters.unseen += 1;
+                    return None;
+                }
+                Some(sight) => self.travelled >= sight.near && !self.view.is_hidden_from_camera(&hit),
+                None => true,
+            };
+            if is_seen {
+                let presence = self.view.presence(&hit, material_id);
+                return Some(SurfacePoint { hit, point, surface, material_id, presence });
             }
-            if self.travelled >= sight.near && !self.view.is_hidden_from_camera(&hit) {
-                return Some(seen(met));
-            }
-            self.overlook(&met, counters);
+            self.overlook(&SurfacePoint { hit, point, surface, material_id, presence: Presence::AsStated }, counters);
             if self.crossings > MAX_CROSSINGS {
                 self.is_lost = true;
                 return None;
@@ -123,12 +125,12 @@ impl<'a> Walk<'a> {
         (self.begin, self.begins_anew) = (self.travelled, true);
     }
 
-    /// What is seen from inside of a glass where `met` is its surface: an opaque surface or a mirror that coincides with it,
-    /// or itself. Without this, rounding would decide for each ray whether glass that stands on a table touches it.
-    pub(super) fn in_contact(&self, met: SurfacePoint, counters: &mut Counters) -> SurfacePoint {
+    /// Puts what is seen from inside of a glass in the place of `met`, its surface: an opaque surface or a mirror that coincides with
+    /// it, if there is one. Without this, rounding would decide for each ray whether glass that stands on a table touches it.
+    pub(super) fn in_contact(&self, met: &mut SurfacePoint, counters: &mut Counters) {
         let bounds_glass = |hit: &Hit, id: u32| self.view.inside(hit, id).is_some();
         if !met.hit.leaving || !self.view.is_in_contact(&met.hit) || !bounds_glass(&met.hit, met.material_id) {
-            return met;
+            return;
         }
         let ahead = Ray { origin: met.point, ..self.ray };
         let mut departures = self.departures;
@@ -142,11 +144,11 @@ impl<'a> Walk<'a> {
                 let (point, surface) = self.view.aggregate.local_surface(&ahead, &hit);
                 // Met where the glass was, by the ray that met the glass.
                 let hit = Hit { distance: met.hit.distance, at_start: met.hit.at_start, ..hit };
-                return SurfacePoint { hit, point, surface, material_id, presence };
+                *met = SurfacePoint { hit, point, surface, material_id, presence };
+                return;
             }
             departures.depart(&ahead, &hit, hit.leaving);
         }
-        met
     }
 
     /// Goes straight on through the surface.

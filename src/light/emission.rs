@@ -115,7 +115,8 @@ impl White {
         if !(0.0..=(STEPS - 1) as f64).contains(&position) {
             return 0.0;
         }
-        let below = (position as usize).min(STEPS - 2);
+        // Of 32 bits, as the processor converts it.
+        let below = (position as i32 as usize).min(STEPS - 2);
         let t = (position - below as f64) as f32;
         self.0[below] + t * (self.0[below + 1] - self.0[below])
     }

@@ -156,6 +156,15 @@ impl Choice {
         }
     }
 
+    /// The tree that is the only candidate there is.
+    #[inline]
+    fn lone_tree(&self) -> Option<&Set> {
+        match &self.sets[..] {
+            [set] if set.infinite.is_empty() && !set.tree.is_empty() => Some(set),
+            _ => None,
+        }
+    }
+
     /// Sum of the importances, and how many there are.
     fn total(&self, chooser: &Chooser, is_linked: &impl Fn(u32) -> bool) -> (f64, f64) {
         let (mut sum, mut count) = (0.0, 0.0);
@@ -172,6 +181,11 @@ impl Choice {
 
     /// The emitter of a light and the probability with which it is chosen; `u` in 0..1.
     pub(super) fn sample(&self, chooser: &Chooser, is_linked: impl Fn(u32) -> bool, u: f64) -> Option<(u32, f64)> {
+        // Nothing to compare it with: no importance is needed.
+        if let Some(Set { illuminates, tree, .. }) = self.lone_tree() {
+            let is_possible = illuminates.is_none_or(&is_linked) && tree.may_reach(chooser.point, chooser.normal);
+            return if is_possible { tree.sample(chooser.point, chooser.normal, u) } else { None };
+        }
         let total = self.total(chooser, &is_linked);
         let mut up_to = 0.0;
         let mut chosen = None;
@@ -197,10 +211,14 @@ impl Choice {
 
     /// The probability with which the light at a place is chosen.
     pub(super) fn probability(&self, chooser: &Chooser, is_linked: impl Fn(u32) -> bool, place: Place) -> f64 {
-        let wanted = match place {
-            Place::Nowhere => return 0.0,
-            Place::InTree { set, .. } => Candidate::Tree(set),
-            Place::Infinite { set, index } => Candidate::Infinite(set, index),
+        let wanted = match (place, self.lone_tree()) {
+            (Place::Nowhere, _) => return 0.0,
+            (Place::InTree { way, .. }, Some(Set { illuminates, tree, .. })) => {
+                let is_possible = illuminates.is_none_or(&is_linked) && tree.may_reach(chooser.point, chooser.normal);
+                return if is_possible { tree.probability(chooser.point, chooser.normal, way) } else { 0.0 };
+            }
+            (Place::InTree { set, .. }, None) => Candidate::Tree(set),
+            (Place::Infinite { set, index }, _) => Candidate::Infinite(set, index),
         };
         let (mut sum, mut count, mut own) = (0.0, 0.0, 0.0);
         self.each(chooser, &is_linked, |candidate, importance| {

@@ -423,9 +423,10 @@ impl<'a> Lighting<'a> {
         f: &mut dyn FnMut(LightHit<N>),
     ) {
         let mut meet = |number: u32| {
-            let placed = self.placed[number as usize].as_ref();
-            let met = placed.and_then(|placed| Some((placed, placed.meet(ray.origin, ray.direction)?)));
-            if let Some((placed, (distance, at))) = met.filter(|(_, (distance, _))| *distance < limit) {
+            if let Some(placed) = &self.placed[number as usize]
+                && let Some((distance, at)) = placed.meet(ray.origin, ray.direction)
+                && distance < limit
+            {
                 let radiance = self.radiance(number as usize, placed, ray.direction, at, wavelengths);
                 let point = ray.origin + distance * ray.direction;
                 f(LightHit { light: LightId(number), distance, radiance, emitter: EmitterId(number), point });

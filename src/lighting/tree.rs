@@ -135,6 +135,11 @@ impl LightTree {
         self.nodes.first().map_or(0.0, |root| self.scale * root.importance(p, normal))
     }
 
+    /// Whether some of it is on the side of `normal`; a no is certain, and the importance then 0.
+    pub(super) fn may_reach(&self, p: DVec3, normal: Option<DVec3>) -> bool {
+        self.nodes.first().is_some_and(|root| normal.is_none_or(|normal| root.is_above(p, normal)))
+    }
+
     /// A light and the probability with which it is chosen; `u` in 0..1.
     pub(super) fn sample(&self, p: DVec3, normal: Option<DVec3>, mut u: f64) -> Option<(u32, f64)> {
         let (mut index, mut probability) = (0, 1.0);
@@ -280,6 +285,17 @@ impl Node {
             is_leaf,
             next,
         }
+    }
+
+    /// Whether a part of the sphere around the bounds is above the plane through `p`.
+    fn is_above(&self, p: DVec3, normal: DVec3) -> bool {
+        let wide = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+        let (min, max) = (wide(self.min), wide(self.max));
+        let radius_squared = 0.25 * (max - min).length_squared();
+        let to = 0.5 * (min + max) - p;
+        let height = to.dot(normal);
+        // The normal comes in single precision.
+        height > 0.0 || height * height <= radius_squared + 2.0 * ROUNDING * to.length_squared()
     }
 
     /// Irradiance that may arrive at `p`, on the side of `normal` or on both.

@@ -2,3 +2,4 @@
 
 pub mod compensated;
 pub mod piecewise;
+pub mod trig;

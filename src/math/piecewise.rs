@@ -4,8 +4,21 @@
 #[derive(Clone, Debug)]
 pub struct PiecewiseLinear {
     knots: Vec<Knot>,
+    segments: Vec<Segment>,
     /// The segment in which cell `i` of the unit interval begins.
     guide: Vec<u32>,
+    /// How many cells there are.
+    cells: f64,
+}
+
+/// From one knot to the next.
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    x: f64,
+    width: f64,
+    pdf: f64,
+    below: f64,
+    slope: f64,
 }
 
 /// Where two segments meet.
@@ -20,7 +33,7 @@ pub struct Knot {
 }
 
 /// Cells of the guide to the segments, per knot.
-const GUIDE: usize = 2;
+const GUIDE: usize = 4;
 
 impl PiecewiseLinear {
     /// Proportional to the linear interpolation of `table`: points (x, value ≥ 0) with x increasing, at least two, not all 0.
@@ -46,7 +59,12 @@ impl PiecewiseLinear {
                 segment as u32
             })
             .collect();
-        Self { knots, guide }
+        let segment = |pair: &[Knot]| {
+            let (a, b) = (pair[0], pair[1]);
+            let width = b.x - a.x;
+            Segment { x: a.x, width, pdf: a.pdf, below: a.below, slope: (b.pdf - a.pdf) / width }
+        };
+        Self { cells: cells as f64, segments: knots.windows(2).map(segment).collect(), knots, guide }
     }
 
     /// The knots in increasing order.
@@ -67,21 +85,21 @@ impl PiecewiseLinear {
     /// The place below which the share `u` of the density lies, and the density there.
     #[inline]
     pub fn inverse(&self, u: f64) -> (f64, f64) {
-        let cell = ((u * self.guide.len() as f64) as usize).min(self.guide.len() - 1);
-        let mut segment = self.guide[cell] as usize;
-        while segment + 2 < self.knots.len() && self.knots[segment + 1].below <= u {
+        let cell = (u * self.cells) as u32 as usize;
+        let mut segment = *self.guide.get(cell).or(self.guide.last()).expect("there is a segment") as usize;
+        while segment + 1 < self.segments.len() && self.segments[segment + 1].below <= u {
             segment += 1;
         }
-        let (a, b) = (&self.knots[segment], &self.knots[segment + 1]);
-        let width = b.x - a.x;
-        let slope = (b.pdf - a.pdf) / width;
-        // p₀t + ½ slope t² = c, in the form that does not cancel.
-        let c = (u - a.below).max(0.0);
-        let root = (a.pdf * a.pdf + 2.0 * slope * c).max(0.0).sqrt();
-        let denominator = a.pdf + root;
-        let t = if denominator > 0.0 { (2.0 * c / denominator).clamp(0.0, width) } else { 0.0 };
-        let x = a.x + t;
-        (x, between(a, b, x))
+        let Segment { x, width, pdf, below, slope } = self.segments[segment];
+        // p₀t + ½ slope t² = c, in the form that does not cancel; the root is the density at t.
+        let c = (u - below).max(0.0);
+        let root = (pdf * pdf + 2.0 * slope * c).max(0.0).sqrt();
+        let denominator = pdf + root;
+        if denominator <= 0.0 {
+            return (x, pdf);
+        }
+        let t = 2.0 * c / denominator;
+        if t < width { (x + t, root) } else { (x + width, pdf + slope * width) }
     }
 }
 

@@ -66,7 +66,7 @@ pub struct Inside {
 pub struct NotInside;
 
 /// How many entered media need no memory of their own. Real scenes nest two or three deep.
-const INLINE: usize = 16;
+const INLINE: usize = 4;
 
 /// The media that a ray is inside of, in the order they were entered.
 #[derive(Clone, Debug)]

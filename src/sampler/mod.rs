@@ -9,6 +9,8 @@ pub mod filter;
 
 use crate::error::{Error, Result};
 use filter::Filter;
+use sobol_burley::parts;
+use std::sync::LazyLock;
 
 /// The most samples a pixel can have. Their indices count in `u32` with room for the nodes of sums over them.
 pub const MAX_SAMPLES: u32 = 1 << 24;
@@ -43,15 +45,79 @@ const GROUPS: u32 = sobol_burley::NUM_DIMENSIONS / 4;
 #[derive(Clone, Copy, Debug)]
 pub struct PathSampler {
     index: u32,
-    seed: u64,
+    pixel_seed: u64,
     group: u32,
+    /// The sample's place in the sequence and the seed of its scrambles.
+    point: Point,
+}
+
+/// What `sobol_burley` scrambles the dimensions of a group with.
+const SCRAMBLES: [u32; 4] = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8];
+
+/// Of every group of four dimensions, the sums of the direction vectors that each hexadecimal digit of an index stands for.
+type Sums = [[[u32; 4]; 16]; 4];
+static SUMS: LazyLock<Vec<Sums>> = LazyLock::new(|| {
+    let dimensions = |group: u32, index_rev: u32| [0, 1, 2, 3].map(|i| parts::sobol_rev(index_rev, 4 * group + i));
+    let sums =
+        |group| [16, 20, 24, 28].map(|shift| std::array::from_fn(|digit| dimensions(group, (digit as u32) << shift)));
+    (0..GROUPS).map(sums).collect()
+});
+
+/// A point of the Owen-scrambled Sobol' sequence: `sobol_burley::sample_4d`, bit by bit, with what all dimensions share computed once.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    shuffled_rev: u32,
+    seed: u32,
+}
+
+impl Point {
+    #[inline]
+    fn new(index: u32, seed: u32) -> Self {
+        let scramble = parts::hash(seed ^ 0x79c6_8e4a);
+        Self {
+            shuffled_rev: parts::owen_scramble_rev(index.reverse_bits(), scramble),
+            seed: seed.wrapping_mul(0x9c8f_2d3b),
+        }
+    }
+
+    /// The bits of four dimensions before they are scrambled, in reverse.
+    #[inline]
+    fn sobol_rev(&self, group: u32) -> [u32; 4] {
+        let sums = &SUMS[group as usize];
+        let digit = |k: usize| sums[k][(self.shuffled_rev >> (16 + 4 * k) & 15) as usize];
+        let (a, b, c, d) = (digit(0), digit(1), digit(2), digit(3));
+        std::array::from_fn(|i| a[i] ^ b[i] ^ c[i] ^ d[i])
+    }
+
+    #[inline]
+    fn dimension(&self, dimension: u32) -> f32 {
+        let (group, lane) = (dimension / 4, dimension as usize % 4);
+        self.scrambled(self.sobol_rev(group)[lane], group, lane)
+    }
+
+    /// Four dimensions at once.
+    #[inline]
+    fn dimensions(&self, group: u32) -> [f32; 4] {
+        let sobol = self.sobol_rev(group);
+        std::array::from_fn(|lane| self.scrambled(sobol[lane], group, lane))
+    }
+
+    #[inline(always)]
+    fn scrambled(&self, sobol_rev: u32, group: u32, lane: usize) -> f32 {
+        let scramble = parts::hash(SCRAMBLES[lane] ^ self.seed ^ group);
+        parts::u32_to_f32_norm(parts::owen_scramble_rev(sobol_rev, scramble).reverse_bits())
+    }
 }
 
 impl PathSampler {
+    fn new(index: u32, pixel_seed: u64, group: u32) -> Self {
+        let (in_block, block_seed) = in_block(index, pixel_seed);
+        Self { index, pixel_seed, group, point: Point::new(in_block, block_seed) }
+    }
+
     /// The place of the hero wavelength, 0..1: stratified over the pixel's samples.
     pub fn wavelength(&self) -> f64 {
-        let (index, seed) = in_block(self.index, self.seed);
-        sobol_burley::sample(index, WAVELENGTH, seed).into()
+        self.point.dimension(WAVELENGTH).into()
     }
 
     /// Four numbers in 0..1, the next of the path.
@@ -60,10 +126,9 @@ impl PathSampler {
         let group = self.group;
         self.group += 1;
         if group < GROUPS {
-            let (index, seed) = in_block(self.index, self.seed);
-            return sobol_burley::sample_4d(index, group, seed);
+            return self.point.dimensions(group);
         }
-        let mut state = hash(self.seed ^ (u64::from(self.index) << 32 | u64::from(group)));
+        let mut state = hash(self.pixel_seed ^ (u64::from(self.index) << 32 | u64::from(group)));
         std::array::from_fn(|_| {
             state = hash(state);
             // 24 bits fill the mantissa: never 1.
@@ -73,12 +138,12 @@ impl PathSampler {
 
     /// The numbers of a side path that begins here: independent of all others, stratified over the pixel's samples themselves.
     pub fn branch(&self) -> Self {
-        Self { seed: hash(self.seed ^ hash(!u64::from(self.group))), ..*self }
+        Self::new(self.index, hash(self.pixel_seed ^ hash(!u64::from(self.group))), FIRST_GROUP)
     }
 
     /// A number in 0..1 for something that has a number of its own on the way: independent of all others.
     pub fn of(&self, what: u64) -> f32 {
-        let state = hash(self.seed ^ hash(what ^ (u64::from(self.index) << 32 | u64::from(self.group))));
+        let state = hash(self.pixel_seed ^ hash(what ^ (u64::from(self.index) << 32 | u64::from(self.group))));
         (state >> 40) as f32 * (1.0 / 16_777_216.0)
     }
 }
@@ -137,12 +202,12 @@ impl Sampler {
 
     /// The numbers of the path that sample `index` of `pixel` begins.
     pub fn path(&self, pixel: [i32; 2], index: u32) -> PathSampler {
-        PathSampler { index, seed: self.pixel_seed(pixel), group: FIRST_GROUP }
+        PathSampler::new(index, self.pixel_seed(pixel), FIRST_GROUP)
     }
 
     /// Independent numbers for the path that sample `index` of `pixel` begins: nothing of them is stratified.
     pub fn independent(&self, pixel: [i32; 2], index: u32) -> PathSampler {
-        PathSampler { index, seed: hash(self.pixel_seed(pixel)), group: GROUPS }
+        PathSampler::new(index, hash(self.pixel_seed(pixel)), GROUPS)
     }
 
     fn pixel_seed(&self, pixel: [i32; 2]) -> u64 {
@@ -159,8 +224,9 @@ impl Sampler {
             return CameraSample::at(x + 0.5, y + 0.5);
         }
         let (index, seed) = in_block(index, self.pixel_seed(pixel));
-        let [dx, dy, u, v] = sobol_burley::sample_4d(index, 0, seed).map(f64::from);
-        let time = if self.over_time { sobol_burley::sample(index, TIME, seed).into() } else { 0.5 };
+        let point = Point::new(index, seed);
+        let [dx, dy, u, v] = point.dimensions(0).map(f64::from);
+        let time = if self.over_time { point.dimension(TIME).into() } else { 0.5 };
         let raster = match &self.filter {
             None => [x + dx, y + dy],
             Some(filter) => {
@@ -202,6 +268,18 @@ mod tests {
             }
         }
         assert_eq!(counts, [[16; 4]; 2]);
+    }
+
+    #[test]
+    fn points_are_those_of_the_sequence() {
+        for (index, seed) in [(0, 0), (1, 7), (12_345, 0xdead_beef), (BLOCK - 1, u32::MAX)] {
+            let point = Point::new(index, seed);
+            for group in 0..GROUPS {
+                let wanted = sobol_burley::sample_4d(index, group, seed);
+                assert_eq!(point.dimensions(group), wanted);
+                assert_eq!([0, 1, 2, 3].map(|i| point.dimension(4 * group + i)), wanted);
+            }
+        }
     }
 
     #[test]

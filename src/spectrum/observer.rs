@@ -17,7 +17,8 @@ pub fn color_matching(wavelength: Wavelength) -> [f64; 3] {
     if !(0.0..=last as f64).contains(&position) {
         return [0.0; 3];
     }
-    let below = (position as usize).min(last - 1);
+    // Of 32 bits, as the processor converts it.
+    let below = (position as i32 as usize).min(last - 1);
     let fraction = position - below as f64;
     std::array::from_fn(|i| CIE_1931[below][i] + fraction * (CIE_1931[below + 1][i] - CIE_1931[below][i]))
 }

@@ -141,7 +141,7 @@ pub(super) struct Scatterer<'s, const N: usize> {
     pub(super) n_g: DVec3,
     pub(super) frame: Frame,
     pub(super) wo: Vec3,
-    pub(super) bsdf: Bsdf<N>,
+    pub(super) bsdf: &'s Bsdf<N>,
     pub(super) receiver: Receiver,
     /// The medium behind, where the surface bounds one.
     pub(super) far: Option<Option<MediumId>>,

@@ -114,7 +114,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                     self.meet(state, ray.direction, &light);
                 });
             }
-            let Some(met) = met else {
+            let Some(mut met) = met else {
                 // What absorbs lets nothing through from infinitely far.
                 let absorbs = |sigma: &SampledSpectrum<N>| sigma.0.iter().any(|&sigma| sigma > 0.0);
                 if state.meets_lights() && !medium.absorption.as_ref().is_some_and(absorbs) {
@@ -125,7 +125,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             if let Some(through) = medium.transmittance(limit) {
                 state.throughput *= through;
             }
-            let met = walk.in_contact(met, &mut self.counters);
+            walk.in_contact(&mut met, &mut self.counters);
             if walk.crossings > MAX_CROSSINGS {
                 self.counters.exhausted += 1;
                 break;
@@ -256,12 +256,14 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             Some(tangent) => Frame::along(normal, tangent),
             None => Frame::about(normal),
         };
+        // Moving it would take longer than what most surfaces need of it.
+        let bsdf = &Bsdf::new(&at.parameters);
         let mut surface = Scatterer {
             met,
             n_g,
             frame,
             wo: frame.to_local(-direction),
-            bsdf: Bsdf::new(&at.parameters),
+            bsdf,
             receiver: Receiver {
                 point: met.point,
                 normal: (!at.transmits).then(|| n_g.as_vec3()),

@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::Toward;
+use crate::math::trig::sin_cos;
 
 /// Below this solid angle the area is sampled: the rounding of the angles, 2^-50, is 2^-30 of it.
 const SMALLEST: f64 = 1.0 / 1_048_576.0;
@@ -21,6 +22,8 @@ pub(in crate::lighting) struct Rectangle {
     center: DVec3,
     /// From the middle to the sides.
     half: [DVec3; 2],
+    /// What has the scalar product 1 with one of them and 0 with the other, in the plane.
+    dual: [DVec3; 2],
     /// Unit vectors of both.
     axes: [DVec3; 2],
     lengths: [f64; 2],
@@ -30,19 +33,24 @@ pub(in crate::lighting) struct Rectangle {
     is_two_sided: bool,
 }
 
-/// A rectangle as it is seen from a point.
+/// A rectangle as it is seen from a point, in units of the height over its plane.
 struct Seen {
     /// Of the corners, along the sides: lower and upper.
     x: [f64; 2],
     y: [f64; 2],
-    /// Negative: behind the plane.
-    z: f64,
-    /// Unit vector along z, away from the rectangle.
-    axis: DVec3,
-    b0: f64,
-    b1: f64,
-    k: f64,
+    /// √(1 + x² + y²) + i xy of the corners (x₀, y₀) and (x₀, y₁).
+    corners: [Complex; 2],
     solid_angle: f64,
+}
+
+type Complex = [f64; 2];
+
+fn product([a, b]: Complex, [c, d]: Complex) -> Complex {
+    [a * c - b * d, a * d + b * c]
+}
+
+fn conjugate([a, b]: Complex) -> Complex {
+    [a, -b]
 }
 
 impl Rectangle {
@@ -50,13 +58,15 @@ impl Rectangle {
     pub(in crate::lighting) fn new(center: DVec3, u: DVec3, v: DVec3, normal: DVec3, is_two_sided: bool) -> Self {
         let lengths = [u.length(), v.length()];
         let axes = [u / lengths[0], v / lengths[1]];
+        let n = u.cross(v);
         Self {
             center,
             half: [u, v],
+            dual: [v.cross(n) / n.length_squared(), n.cross(u) / n.length_squared()],
             axes,
             lengths,
             normal,
-            area: 4.0 * u.cross(v).length(),
+            area: 4.0 * n.length(),
             is_right_angled: axes[0].dot(axes[1]).abs() <= PERPENDICULAR,
             is_two_sided,
         }
@@ -78,10 +88,8 @@ impl Rectangle {
 
     /// −1..1 along both sides, of a point of the plane.
     pub(in crate::lighting) fn coordinates(&self, point: DVec3) -> [f64; 2] {
-        let ([u, v], q) = (self.half, point - self.center);
-        let n = u.cross(v);
-        let scale = 1.0 / n.length_squared();
-        [q.cross(v).dot(n) * scale, u.cross(q).dot(n) * scale]
+        let q = point - self.center;
+        self.dual.map(|dual| q.dot(dual))
     }
 
     /// Height of a point over the plane; `None` on the side that is dark and in the plane.
@@ -91,41 +99,36 @@ impl Rectangle {
     }
 
     /// The solid angle where it is what is sampled.
-    fn seen(&self, p: DVec3) -> Option<Seen> {
+    fn seen(&self, p: DVec3, height: f64) -> Option<Seen> {
         if !self.is_right_angled {
             return None;
         }
-        let height = self.height(p)?;
         let corner = self.center - self.half[0] - self.half[1] - p;
         let (x0, y0) = (corner.dot(self.axes[0]), corner.dot(self.axes[1]));
         let (x, y) = ([x0, x0 + 2.0 * self.lengths[0]], [y0, y0 + 2.0 * self.lengths[1]]);
-        let z = -height.abs();
-        // z components of the normals of the planes through the eye and a side.
-        let across = |a: f64| a / libm::hypot(a, z);
-        let (n0, n1, n2, n3) = (-across(y[0]), across(x[1]), across(y[1]), -across(x[0]));
-        let angle = |a: f64, b: f64| libm::acos((-a * b).clamp(-1.0, 1.0));
-        let (g0, g1, g2, g3) = (angle(n0, n1), angle(n1, n2), angle(n2, n3), angle(n3, n0));
-        let solid_angle = g0 + g1 + g2 + g3 - 2.0 * PI;
-        let axis = if height > 0.0 { self.normal } else { -self.normal };
-        (solid_angle >= SMALLEST).then_some(Seen { x, y, z, axis, b0: n0, b1: n2, k: 2.0 * PI - g2 - g3, solid_angle })
+        let seen = Seen::new(x, y, height.abs());
+        (seen.solid_angle >= SMALLEST).then_some(seen)
     }
 
     /// How large it looks from a point, steradian; `None` where that is little and from where it is dark.
     pub(in crate::lighting) fn solid_angle(&self, p: DVec3) -> Option<f64> {
-        self.seen(p).map(|seen| seen.solid_angle)
+        self.seen(p, self.height(p)?).map(|seen| seen.solid_angle)
     }
 
     pub(in crate::lighting) fn sample(&self, p: DVec3, u: [f64; 2]) -> Option<Toward> {
         let height = self.height(p)?;
-        let (to, by_angle) = match self.seen(p) {
-            Some(seen) => (seen.point(u, self.axes), Some(1.0 / seen.solid_angle)),
+        let (to, by_angle) = match self.seen(p, height) {
+            Some(seen) => {
+                let [x, y] = seen.point(u).map(|a| a * height.abs());
+                (x * self.axes[0] + y * self.axes[1] - height * self.normal, Some(1.0 / seen.solid_angle))
+            }
             None => {
                 let [s, t] = u.map(|u| 2.0 * u - 1.0);
                 (self.center + s * self.half[0] + t * self.half[1] - p, None)
             }
         };
         let distance = to.length();
-        let wi = to / distance;
+        let wi = to * (1.0 / distance);
         let pdf_solid_angle = by_angle.unwrap_or_else(|| self.by_area(height, distance));
         Some(Toward { wi, distance, pdf_solid_angle })
     }
@@ -133,7 +136,7 @@ impl Rectangle {
     /// Of the direction that meets it at `distance`.
     pub(in crate::lighting) fn pdf(&self, p: DVec3, distance: f64) -> f64 {
         let Some(height) = self.height(p) else { return 0.0 };
-        self.seen(p).map_or_else(|| self.by_area(height, distance), |seen| 1.0 / seen.solid_angle)
+        self.seen(p, height).map_or_else(|| self.by_area(height, distance), |seen| 1.0 / seen.solid_angle)
     }
 
     /// distance² / (area · cos), where cos = height / distance.
@@ -144,7 +147,11 @@ impl Rectangle {
     /// Distance at which a ray meets the side that shines, and where between the sides, −1..1.
     pub(in crate::lighting) fn meet(&self, origin: DVec3, direction: DVec3) -> Option<(f64, [f64; 2])> {
         let height = self.height(origin)?;
-        let distance = -height / direction.dot(self.normal);
+        let rise = direction.dot(self.normal);
+        if height * rise >= 0.0 {
+            return None;
+        }
+        let distance = -height / rise;
         if !(distance > 0.0 && distance.is_finite()) {
             return None;
         }
@@ -154,19 +161,44 @@ impl Rectangle {
 }
 
 impl Seen {
-    /// From the eye to the point with the coordinates `u` of the unit square.
-    fn point(&self, [u, v]: [f64; 2], axes: [DVec3; 2]) -> DVec3 {
-        let Self { x, y, z, axis, b0, b1, k, solid_angle } = *self;
-        let au = u * solid_angle + k;
-        let fu = (libm::cos(au) * b0 - b1) / libm::sin(au);
-        let cu = (1f64.copysign(fu) / libm::hypot(fu, b0)).clamp(-1.0, 1.0);
-        let sine = (1.0 - cu * cu).sqrt();
-        let xu = if sine > 0.0 { (-cu * z / sine).clamp(x[0], x[1]) } else { x[usize::from(cu > 0.0)] };
-        let d = libm::hypot(xu, z);
-        let [h0, h1] = y.map(|y| y / libm::hypot(d, y));
+    /// Each corner has atan(xy/√(1 + x² + y²)) of the solid angle, with alternating signs; their sum is the argument of a product.
+    fn new(x: [f64; 2], y: [f64; 2], height: f64) -> Self {
+        let scale = 1.0 / height;
+        let (x, y) = (x.map(|x| x * scale), y.map(|y| y * scale));
+        let ([x0, x1], [y0, y1]) = (x, y);
+        let corner = |x: f64, y: f64| [(1.0 + x * x + y * y).sqrt(), x * y];
+        let corners = [corner(x0, y0), corner(x0, y1)];
+        let upper = product(corner(x1, y1), conjugate(corners[1]));
+        let lower = product(corners[0], conjugate(corner(x1, y0)));
+        let [re, im] = product(upper, lower);
+        let angle = libm::atan2(im, re);
+        // More than π is seen from near over it only; all else below 0 is rounding.
+        let is_over_it = x0 < 0.0 && x1 > 0.0 && y0 < 0.0 && y1 > 0.0 && (x1 - x0) * (y1 - y0) > 1.0;
+        let solid_angle = if angle < 0.0 && is_over_it { angle + 2.0 * PI } else { angle };
+        Self { x, y, corners, solid_angle }
+    }
+
+    /// The point with the coordinates `u` of the unit square.
+    ///
+    /// In the article's symbols: e^{ik} = −c₀₁ c̄₀₀ / |c₀₁ c₀₀| of the corners, b₀ = −y₀/a₀ and b₁ = y₁/a₁ with a = √(1 + y²); then
+    /// 1/(f² + b₀² − 1), which is xᵤ², has sin² a₀² a₁² above and (cos y₀ a₁ + y₁ a₀)² − sin² a₁² below.
+    fn point(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let Self { x, y, corners, solid_angle } = *self;
+        let [a0, a1] = y.map(|y| (1.0 + y * y).sqrt());
+        let [cos_k, sin_k] = product(corners[1], conjugate(corners[0])).map(|part| -part);
+        let (sin, cos) = sin_cos(u * solid_angle);
+        let [cos, sin] = product([cos_k, sin_k], [cos, sin]);
+        let length = (1.0 + x[0] * x[0]) * a0 * a1;
+        let f = -(cos * y[0] * a1 + length * y[1] * a0);
+        let below = f * f - sin * sin * a1 * a1;
+        let is_upper = (f < 0.0) == (sin < 0.0);
+        let xu = if below > 0.0 { (sin * a0 * a1).abs() / below.sqrt() } else { f64::INFINITY };
+        let xu = (if is_upper { xu } else { -xu }).clamp(x[0], x[1]);
+        let d = 1.0 + xu * xu;
+        let [h0, h1] = y.map(|y| y / (d + y * y).sqrt());
         let h = h0 + v * (h1 - h0);
         let rest = 1.0 - h * h;
-        let yv = if rest > 0.0 { (h * d / rest.sqrt()).clamp(y[0], y[1]) } else { y[usize::from(h > 0.0)] };
-        xu * axes[0] + yv * axes[1] + z * axis
+        let yv = if rest > 0.0 { h * (d / rest).sqrt() } else { f64::INFINITY.copysign(h) };
+        [xu, yv.clamp(y[0], y[1])]
     }
 }

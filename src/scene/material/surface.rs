@@ -239,7 +239,17 @@ impl Tint {
         }
     }
 
+    /// Most tints of a surface are black or white.
+    #[inline(always)]
     fn at<const N: usize>(&self, found: Found<'_>, wavelengths: &Wavelengths<N>) -> SampledSpectrum<N> {
+        match self {
+            Self::Black => SampledSpectrum::ZERO,
+            Self::White => SampledSpectrum::ONE,
+            _ => self.spectrum(found, wavelengths),
+        }
+    }
+
+    fn spectrum<const N: usize>(&self, found: Found<'_>, wavelengths: &Wavelengths<N>) -> SampledSpectrum<N> {
         match self {
             Self::Black => SampledSpectrum::ZERO,
             Self::White => SampledSpectrum::ONE,
@@ -557,46 +567,51 @@ impl Surface {
         let found = Found { results, reflectance: self.reflectance.as_ref() };
         let tint = |tint: &Tint| tint.at(found, wavelengths);
         let pair = |pair: &[Number; 2]| pair.map(|number| number.at(results));
-        let presence = self.presence.at(results);
-        let parameters = Parameters {
-            base_color: tint(&self.base_color),
-            diffuse_roughness: self.diffuse_roughness.at(results),
-            metalness: self.metalness.at(results),
-            metal: self.metal(found, wavelengths),
-            specular_weight: self.specular_weight.at(results),
-            specular_color: tint(&self.specular_color),
-            alpha: pair(&self.alpha),
-            interface: self.interface(results, wavelengths, interface),
-            transmission: self.transmission.at(results),
-            transmission_tint: tint(&self.transmission_tint),
-            thin_walled: self.thin_walled,
-            coat: self.coat.map(|coat| Coat {
-                weight: coat.weight.at(results),
-                color: tint(&coat.color),
-                ior: coat.ior.at(results),
-                alpha: pair(&coat.alpha),
-                darkening: coat.darkening.at(results),
-            }),
-            sheen: self.sheen.as_ref().map(|(weight, color, roughness)| Sheen {
-                weight: weight.at(results),
-                color: tint(color),
-                roughness: roughness.at(results),
-            }),
-            film: self.film.as_ref().map(|[weight, thickness, ior]| Film {
-                weight: weight.at(results),
-                thickness_nm: thickness.at(results),
-                ior: ior.at(results),
-                nanometers: SampledSpectrum::from_fn(|lane| wavelengths.nanometers()[lane] as f32),
-            }),
-            diffuse_transmission: tint(&self.diffuse_transmission),
-            schlick_f0: self.schlick_f0.as_ref().map(tint),
-        };
+        // Everything in one literal: it is long, and written once.
         let emission = self.emission(results);
         let normal_map = self.normal.map(|normal| match normal {
             Source::Constant(normal) => normal,
             Source::LookedUp(i) => [results[i][0], results[i][1], results[i][2]],
         });
-        SurfaceAt { parameters, presence, emission, normal_map, rotation: self.rotation.at(results) }
+        SurfaceAt {
+            parameters: Parameters {
+                base_color: tint(&self.base_color),
+                diffuse_roughness: self.diffuse_roughness.at(results),
+                metalness: self.metalness.at(results),
+                metal: self.metal(found, wavelengths),
+                specular_weight: self.specular_weight.at(results),
+                specular_color: tint(&self.specular_color),
+                alpha: pair(&self.alpha),
+                interface: self.interface(results, wavelengths, interface),
+                transmission: self.transmission.at(results),
+                transmission_tint: tint(&self.transmission_tint),
+                thin_walled: self.thin_walled,
+                coat: self.coat.map(|coat| Coat {
+                    weight: coat.weight.at(results),
+                    color: tint(&coat.color),
+                    ior: coat.ior.at(results),
+                    alpha: pair(&coat.alpha),
+                    darkening: coat.darkening.at(results),
+                }),
+                sheen: self.sheen.as_ref().map(|(weight, color, roughness)| Sheen {
+                    weight: weight.at(results),
+                    color: tint(color),
+                    roughness: roughness.at(results),
+                }),
+                film: self.film.as_ref().map(|[weight, thickness, ior]| Film {
+                    weight: weight.at(results),
+                    thickness_nm: thickness.at(results),
+                    ior: ior.at(results),
+                    nanometers: SampledSpectrum::from_fn(|lane| wavelengths.nanometers()[lane] as f32),
+                }),
+                diffuse_transmission: tint(&self.diffuse_transmission),
+                schlick_f0: self.schlick_f0.as_ref().map(tint),
+            },
+            presence: self.presence.at(results),
+            emission,
+            normal_map,
+            rotation: self.rotation.at(results),
+        }
     }
 
     /// Share of the surface that is there.
