@@ -113,13 +113,6 @@ fn before(distance: f64) -> f64 {
     distance * (1.0 - 1e-9)
 }
 
-/// Whether a light shines on diffuse and specular materials differently from what it is.
-fn has_factors(light: &Light) -> bool {
-    #[expect(clippy::float_cmp, reason = "1 is what nobody authored")]
-    let factors = light.diffuse != 1.0 || light.specular != 1.0;
-    factors
-}
-
 impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     pub(super) fn new(setting: Setting<'a>, laws: &'a Laws<'a>, expressions: &'a [Expression]) -> Self {
         let media = PathMedia::new(laws, visible::sample(0.5));
@@ -199,18 +192,24 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             return;
         }
         let emission = self.emission(met.light);
+        let light = lighting.light(met.light);
+        let mut seen = met.radiance;
+        if state.object.is_some()
+            && let Some(light) = light.filter(|light| light.has_factors())
+        {
+            let diffuse_share = state.vertex.as_ref().map_or(SampledSpectrum::ZERO, |vertex| vertex.diffuse_share);
+            let specular = SampledSpectrum::splat(light.specular as f32);
+            seen *= specular + diffuse_share * (light.diffuse - light.specular) as f32;
+        }
         let Some(vertex) = &state.vertex else {
             // Nothing but this way leads there.
-            self.ledger.add(state.carried::<DISPERSIVE>() * met.radiance, emission);
+            self.ledger.add(state.carried::<DISPERSIVE>() * seen, emission);
             return;
         };
         let pdf = lighting.pdf(&vertex.receiver, direction, met);
-        let mut seen = met.radiance;
-        if let Some(light) = lighting.light(met.light)
-            && has_factors(light)
-        {
-            let specular = SampledSpectrum::splat(light.specular as f32);
-            seen *= specular + vertex.diffuse_share * (light.diffuse - light.specular) as f32;
+        if pdf > 0.0 && light.is_some_and(|light| !light.has_natural_shadows()) {
+            // What blocks it is not what blocks rays: all of it is sampled.
+            return;
         }
         let weight = if DISPERSIVE {
             1.0 / (state.r + vertex.r_over_pdf * pdf).mean()
@@ -415,7 +414,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         let mut f = surface.bsdf.evaluate(surface.wo, wi);
         let source = self.setting.lighting.light(light.light);
         if let Some(source) = source
-            && has_factors(source)
+            && source.has_factors()
         {
             f.diffuse *= source.diffuse as f32;
             f.glossy *= source.specular as f32;
@@ -433,7 +432,8 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             return;
         }
         let Some(through) = self.visibility(walk, surface, light, source, state, numbers) else { return };
-        let weight = match (light.is_delta, DISPERSIVE) {
+        let is_sampled_alone = light.is_delta || source.is_some_and(|source| !source.has_natural_shadows());
+        let weight = match (is_sampled_alone, DISPERSIVE) {
             (true, true) => 1.0 / (state.r * light.pdf).mean(),
             (true, false) => 1.0 / light.pdf,
             (false, true) => 1.0 / (state.r * (f.pdf + SampledSpectrum::splat(light.pdf))).mean(),
