@@ -18,14 +18,14 @@ Array = npt.NDArray[np.float64]
 NM = np.arange(360.0, 831.0)
 OBSERVER: Array = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].values
 TOLERANCE = 1e-4
-# A path's wavelengths lie anywhere: what they converge to is the integral of what is linear between whole nanometres, not
-# the sum over those. The two differ by a sixth of the product of both slopes per nm, which is 1.2e-4 for a black body of
-# 1000 K and for the bands of FL11. So colour-science sums over tenths of nanometres here, a hundredth of that off.
-FINE = np.arange(3600, 8301) / 10.0
+# A path's wavelengths lie anywhere: what they converge to is the integral of what is linear between whole nanometres,
+# not the sum over those. The two differ by a sixth of the product of both slopes per nm, which is 1.2e-4 for a black
+# body of 1000 K and for the bands of FL11. So colour-science sums over eighths of nanometres here, a 64th of that off.
+FINE = np.arange(360.0, 830.125, 0.125)
 FINE_OBSERVER = colour.MultiSpectralDistributions(
     np.stack([np.interp(FINE, NM, OBSERVER[:, i]) for i in range(3)], axis=1), FINE
 )
-FINE_EQUAL = colour.sd_ones(colour.SpectralShape(360, 830, 0.1))
+FINE_EQUAL = colour.sd_ones(colour.SpectralShape(360, 830, 0.125))
 
 
 def table(distribution: colour.SpectralDistribution) -> Array:
