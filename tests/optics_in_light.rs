@@ -73,7 +73,7 @@ fn a_prism_shows_a_lamp_where_refraction_puts_it() {
     assert!(sum.abs() < 0.007, "{sum}°");
 }
 
-/// No glass that exists: n is about 3/2, so that the focus is well outside of a ball, but the Abbe number 20.
+/// No glass that exists: n is about 3/2, so that the focus is well outside of a ball, but the Abbe number 19.
 const BALL: ([f64; 3], [f64; 3]) = ([1.2, 0.0, 0.0], [0.03, 0.01, 0.01]);
 /// Half the side of the square stop before the ball of radius 1.
 const STOP: f64 = 0.4;

@@ -1,9 +1,9 @@
 //! `path` against `reference`, the slow truth, for every material, light and camera.
 //!
-//! Both render the picture in X, Y, Z (what R, G, B are told apart by costs noise and tells nothing about transport), and the difference is
-//! compared with its standard error: pixel by pixel, in quarters of the picture and in the whole. Each test states the standard error of the whole
-//! and is held to that: 0.5 % for materials and lights that are not natural, 1 % for lights (which `reference` must meet by chance),
-//! cameras and glass that glows.
+//! Both render the picture in X, Y, Z (what R, G, B are told apart by costs noise and tells nothing about transport), and the
+//! difference is compared with its standard error: pixel by pixel, in quarters of the picture and in the whole. Each test states
+//! the standard error of the whole and is held to that: 0.5 % for materials and lights that are not natural, 1 % for lights
+//! (which `reference` must meet by chance), cameras and glass that glows.
 
 mod support;
 
@@ -57,15 +57,15 @@ impl Estimate {
 struct Effort {
     /// Samples a pixel of `path`, of `reference`.
     samples: [u32; 2],
-    /// Standard error of the ratio of both pictures' Y, at most; X and Z have up to twice as much. An error of the whole picture that is six
-    /// times as large is found with a probability of 93 %.
+    /// Standard error of the ratio of both pictures' Y, at most; X and Z have up to twice as much. An error of the whole picture
+    /// that is six times as large is found with a probability of 93 %.
     error: f64,
 }
 
 /// `path` and `reference` agree, pixel by pixel, in quarters of the picture and in the whole.
 ///
-/// With some fifty pictures |z| = 5.5 is met by chance in a pixel in one of 5000 runs of the whole file, |z| = 4.5 in a quarter or a
-/// whole in one of 200; seeds are fixed, so that only a change of the bits throws the dice again.
+/// With some fifty pictures |z| = 5.5 is met by chance in a pixel in one of 5000 runs of the whole file, |z| = 4.5 in a quarter
+/// or a whole in one of 200; seeds are fixed, so that only a change of the bits throws the dice again.
 fn assert_agree(name: &str, scene: &Scene, Effort { samples, error }: Effort) {
     let seed = name.bytes().fold(7, |hash: u64, byte| hash.wrapping_mul(31) + u64::from(byte));
     let [a, b] = [("path", samples[0], 0), ("reference", samples[1], seed)].map(|(integrator, samples, seed)| {

@@ -2,8 +2,8 @@
 //!
 //! One wavelength a path, drawn uniformly from 360–830 nm; where the path goes, the BSDF alone decides; light counts where the path
 //! happens to meet it. No companions, no stratification, no multiple importance sampling, no columns. Light that no path can
-//! meet (parallel light, points, lines, light whose shadows are not those of what is in the way) is the one exception: it is sampled. Of `path` it shares what is not an estimator: rays and
-//! media, surfaces, one sample of a BSDF, what lights emit.
+//! meet (parallel light, points, lines, light whose shadows are not those of what is in the way) is the one exception: it is
+//! sampled. Of `path` it shares what is not an estimator: rays and media, surfaces, one sample of a BSDF, what lights emit.
 
 use std::ops::Range;
 
@@ -274,8 +274,8 @@ struct LastEvent {
 }
 
 impl LastEvent {
-    /// The share of a light met by chance that it receives: by its link set, by the light's factors, and nothing of light that was
-    /// sampled there.
+    /// The share of a light met by chance that it receives: by its link set, by the light's factors, and nothing of light that
+    /// was sampled there.
     fn receives(&self, lighting: &Lighting<'_>, direction: DVec3, met: &LightHit<1>) -> f32 {
         if !lighting.is_linked(met.light, self.receiver.object) {
             return 0.0;
