@@ -334,7 +334,7 @@ fn path_is_reference_for_light_that_is_not_natural() {
 
 #[test]
 fn path_is_reference_for_light_with_a_picture_on_it() {
-    let pixel = |x: u32, y: u32| if (x / 2 + y / 3) % 2 == 0 { [255, 200, 40] } else { [10, 30, 120] };
+    let pixel = |x: u32, y: u32| if (x / 2 + y / 3).is_multiple_of(2) { [255, 200, 40] } else { [10, 30, 120] };
     let effort = Effort { samples: [2048, 24576], error: 0.01 };
     let down = at(0.0, 4.0, 1.0) * DMat4::from_rotation_x(-PI / 2.0);
     let mut s = still_life(|s| lambert(s, 0.6), Vec::new());
