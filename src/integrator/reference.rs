@@ -2,8 +2,8 @@
 //!
 //! One wavelength a path, drawn uniformly from 360–830 nm; where the path goes, the BSDF alone decides; light counts where the path
 //! happens to meet it. No companions, no stratification, no multiple importance sampling, no columns. Light that no path can
-//! meet (parallel light, points, lines) is the one exception: it is sampled. Of `path` it shares what is not an estimator: rays and
-//! media, surfaces, one sample of a BSDF, what lights emit.
+//! meet (parallel light, points, lines, light whose shadows are not those of what is in the way) is the one exception: it is
+//! sampled. Of `path` it shares what is not an estimator: rays and media, surfaces, one sample of a BSDF, what lights emit.
 
 use std::ops::Range;
 
@@ -20,9 +20,11 @@ use crate::error::Result;
 use crate::film::aov::{AOVS, Aov, COLOR, SAMPLE_COUNT, SPECTRAL, VARIANCE};
 use crate::film::pixel::PixelAccumulator;
 use crate::geometry::Ray;
-use crate::lighting::{Lighting, Receiver};
+use crate::light::Light;
+use crate::lighting::{LightHit, LightSample, Lighting, Receiver};
 use crate::ray::{ScatterKind, mirror, refract_or_reflect};
 use crate::sampler::PathSampler;
+use crate::spectrum::reflectance::Reflectance;
 use crate::spectrum::{SampledSpectrum, Wavelengths, sensor, visible};
 
 /// From this vertex on roulette may end a path.
@@ -117,28 +119,24 @@ impl<'a> BruteForce<'a> {
         let Prepared { task, lighting, .. } = self.prepared;
         // The last is the squared index of the medium over that of the first.
         let (mut radiance, mut throughput, mut vertices, mut squeezed) = (0.0, 1.0, 0, 1.0);
-        // The object of the last event, which only its own lights reach.
-        let mut object = None;
+        let mut last: Option<LastEvent> = None;
         loop {
             let met = walk.advance(&mut self.counters);
             let ray = walk.ray;
             let medium = self.media.of(walk.media.current());
             let through = |distance: f64| medium.transmittance(distance).map_or(1.0, |t| t.hero());
             let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
-            let is_linked = |light| object.is_none_or(|object| lighting.is_linked(light, object));
+            let received = |light: &LightHit<1>| {
+                let share = last.as_ref().map_or(1.0, |last| last.receives(lighting, ray.direction, light));
+                share * light.radiance.hero()
+            };
             lighting.along(&ray, limit, wavelengths, &mut |light| {
-                if !is_linked(light.light) {
-                    return;
-                }
-                radiance += throughput * through(light.distance) * light.radiance.hero();
+                radiance += throughput * through(light.distance) * received(&light);
             });
             let alpha = f64::from(u8::from(vertices > 0));
             let Some(mut met) = met else {
                 lighting.environment(&ray, wavelengths, &mut |light| {
-                    if !is_linked(light.light) {
-                        return;
-                    }
-                    radiance += throughput * through(f64::INFINITY) * light.radiance.hero();
+                    radiance += throughput * through(f64::INFINITY) * received(&light);
                 });
                 return (radiance, alpha);
             };
@@ -162,13 +160,12 @@ impl<'a> BruteForce<'a> {
                 continue;
             }
             vertices += 1;
-            if let Some(light) = lighting.emitted(&ray, &met.hit, wavelengths).filter(|light| is_linked(light.light)) {
-                radiance += throughput * light.radiance.hero();
+            if let Some(light) = lighting.emitted(&ray, &met.hit, wavelengths) {
+                radiance += throughput * received(&light);
             }
             if lighting.replaces_material(&met.hit) {
                 return (radiance, 1.0);
             }
-            object = Some(met.hit.instance);
             let facing = |n: DVec3| if ray.direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
             let n_g = facing(met.surface.n_g);
             let n_s = Some(facing(at.normal)).filter(|n| ray.direction.dot(*n) < 0.0).unwrap_or(n_g);
@@ -177,19 +174,27 @@ impl<'a> BruteForce<'a> {
             let bsdf = Bsdf::new(&at.parameters);
             let receiver = Receiver { point: met.point, normal: None, object: met.hit.instance, time: ray.time };
             if let Some(light) = lighting.sample(&receiver, wavelengths, u_light, [u_x, u_y])
-                && light.is_delta
+                && let source = lighting.light(light.light)
+                && (light.is_delta || source.is_some_and(|source| !source.has_natural_shadows()))
             {
                 let wi = frame.to_local(light.wi);
                 let f = bsdf.evaluate(wo, wi);
-                let value = (f.diffuse + f.glossy).hero() * light.radiance.hero() / light.pdf;
+                let [diffuse, specular] = source.map_or([1.0; 2], |source| [source.diffuse, source.specular]);
+                let value = diffuse as f32 * f.diffuse.hero() + specular as f32 * f.glossy.hero();
+                let value = value * light.radiance.hero() / light.pdf;
                 let lit = (wi.z > 0.0) == (light.wi.dot(n_g) > 0.0);
-                if lit && value > 0.0 && self.sees(walk, &met, light.wi, light.distance) {
-                    radiance += throughput * value;
+                if lit && value > 0.0 {
+                    radiance += throughput * value * self.shadow(walk, &met, &light, wavelengths);
                 }
             }
             let [u_lobe, u, v, u_roulette] = numbers.draw();
             let Some(sample) = bsdf.sample(wo, u_lobe, [u, v]) else { return (radiance, 1.0) };
             throughput *= sample.weight.hero();
+            last = Some(LastEvent {
+                receiver,
+                diffuse_share: sample.diffuse.safe_div(sample.weight).hero(),
+                is_smooth: !matches!(sample.scattered, Scattered::Toward(_)),
+            });
             let (direction, passes) = match sample.scattered {
                 Scattered::Toward(wi) => {
                     let direction = frame.to_world(wi);
@@ -230,13 +235,56 @@ impl<'a> BruteForce<'a> {
         }
     }
 
-    /// Whether nothing at all is in the way.
-    fn sees(&self, walk: &Walk<'_>, met: &SurfacePoint, direction: DVec3, distance: f64) -> bool {
+    /// What is left of a sampled light in the shadow of the nearest thing in the way.
+    fn shadow(&self, walk: &Walk<'_>, met: &SurfacePoint, light: &LightSample<1>, wavelengths: &Wavelengths<1>) -> f32 {
+        let Prepared { task, lighting, .. } = self.prepared;
+        let source = lighting.light(light.light);
         let mut departures = walk.departures;
-        departures.depart(&walk.ray, &met.hit, direction.dot(met.surface.n_g) > 0.0);
-        let view = self.prepared.task.view;
-        let ray = Ray { origin: met.point, direction, ..walk.ray };
-        let nearest = view.intersect(&ray, &departures);
-        nearest.is_none_or(|hit| hit.distance >= distance * (1.0 - 1e-9))
+        departures.depart(&walk.ray, &met.hit, light.wi.dot(met.surface.n_g) > 0.0);
+        let mut ray = Ray { origin: met.point, direction: light.wi, ..walk.ray };
+        let mut travelled = 0.0;
+        while let Some(hit) = task.view.intersect(&ray, &departures) {
+            travelled += hit.distance;
+            if travelled >= light.distance * (1.0 - 1e-9) {
+                return 1.0;
+            }
+            if source
+                .and_then(|source| source.shadowed_by)
+                .is_none_or(|set| task.view.scene.is_linked(set, hit.instance))
+            {
+                let Some(Light { shadow, .. }) = source else { return 0.0 };
+                let strength = shadow.strength(travelled) as f32;
+                let color = Reflectance::of_color(shadow.color.map(|channel| channel as f32));
+                return 1.0 - strength * (1.0 - color.at(wavelengths).hero());
+            }
+            departures.depart(&ray, &hit, hit.leaving);
+            ray.origin += hit.distance * ray.direction;
+        }
+        1.0
+    }
+}
+
+/// The last event on a path.
+struct LastEvent {
+    receiver: Receiver,
+    /// The part of its weight that is diffuse.
+    diffuse_share: f32,
+    /// Whether nothing but this way leads on.
+    is_smooth: bool,
+}
+
+impl LastEvent {
+    /// The share of a light met by chance that it receives: by its link set, by the light's factors, and nothing of light that
+    /// was sampled there.
+    fn receives(&self, lighting: &Lighting<'_>, direction: DVec3, met: &LightHit<1>) -> f32 {
+        if !lighting.is_linked(met.light, self.receiver.object) {
+            return 0.0;
+        }
+        let Some(light) = lighting.light(met.light) else { return 1.0 };
+        let is_met = self.is_smooth || light.has_natural_shadows();
+        if !is_met && lighting.pdf(&self.receiver, direction, met) > 0.0 {
+            return 0.0;
+        }
+        light.diffuse as f32 * self.diffuse_share + light.specular as f32 * (1.0 - self.diffuse_share)
     }
 }

@@ -53,6 +53,18 @@ pub struct Light {
 }
 
 impl Light {
+    /// Whether diffuse and specular materials receive other than what the light is.
+    pub fn has_factors(&self) -> bool {
+        #[expect(clippy::float_cmp, reason = "1 is what nobody authored")]
+        let factors = self.diffuse != 1.0 || self.specular != 1.0;
+        factors
+    }
+
+    /// Whether it is blocked by what blocks rays, all of it and nothing else.
+    pub fn has_natural_shadows(&self) -> bool {
+        self.shadow.is_natural() && self.shadowed_by.is_none()
+    }
+
     /// What the emission is multiplied by in a direction of travel, a unit vector in the world.
     pub fn shaped(&self, direction: DVec3) -> [f64; 3] {
         match &self.shaping {

@@ -257,7 +257,7 @@ impl<'a> Lighting<'a> {
         let (p, u) = (receiver.point, u.map(f64::from));
         let light = match self.emitters[number as usize] {
             Emitter::Piece { object, primitive } => {
-                return self.sample_piece(object, primitive, p, u, probability, wavelengths);
+                return self.sample_piece(object, primitive, receiver, u, probability, wavelengths);
             }
             Emitter::Light => number as usize,
         };
@@ -276,7 +276,7 @@ impl<'a> Lighting<'a> {
         let toward = match &placed.form {
             Form::Rectangle { shape, .. } => shape.sample(p, u)?,
             Form::Disk(disk) => disk.sample(p, u)?,
-            Form::Ellipsoid(ball) => ball.sample(p, u)?,
+            Form::Ellipsoid(ball) => ball.sample(p, false, u)?,
             Form::Tube(tube) => tube.sample(p, u)?,
             Form::Dome(dome) => dome.sample(p, chooser.normal, u)?,
             Form::Distant(sky) if sky.is_parallel() => {
@@ -314,15 +314,18 @@ impl<'a> Lighting<'a> {
         &self,
         object: u32,
         primitive: u32,
-        p: DVec3,
+        receiver: &Receiver,
         u: [f64; 2],
         probability: f64,
         wavelengths: &Wavelengths<N>,
     ) -> Option<LightSample<N>> {
         let object = self.objects.get(object);
+        // An object may light itself, but not a point of it that very point, on whichever side of it rounding has put the ray.
+        let (p, on_it) = (receiver.point, object.instance == receiver.object);
         let (Toward { wi, distance, pdf_solid_angle }, barycentric) = match object.piece(self.view, primitive)? {
             Piece::Triangle(triangle) => triangle.sample(p, u)?,
-            Piece::Sphere(ball) => (ball.sample(p, u)?, [0.0; 2]),
+            Piece::Sphere(ball) => (ball.sample(p, on_it, u)?, [0.0; 2]),
+            Piece::Face(face) if on_it && face.is_in_plane(p) => return None,
             Piece::Face(face) => (face.sample(p, u)?, [0.0; 2]),
             Piece::Ring(ring) => (ring.sample(p, u)?, [0.0; 2]),
         };
@@ -393,17 +396,20 @@ impl<'a> Lighting<'a> {
         }
         let (p, distance) = (receiver.point, (hit.point - receiver.point).length());
         let pdf_solid_angle = match self.emitters[number as usize] {
-            Emitter::Piece { object, primitive } => match self.objects.get(object).piece(self.view, primitive) {
-                Some(Piece::Triangle(triangle)) => triangle.pdf(p, wi, distance),
-                Some(Piece::Sphere(ball)) => ball.pdf(p, wi, distance),
-                Some(Piece::Face(face)) => face.pdf(p, distance),
-                Some(Piece::Ring(ring)) => ring.pdf(p, wi, distance),
-                None => 0.0,
-            },
+            Emitter::Piece { object, primitive } => {
+                let object = self.objects.get(object);
+                match object.piece(self.view, primitive) {
+                    Some(Piece::Triangle(triangle)) => triangle.pdf(p, wi, distance),
+                    Some(Piece::Sphere(ball)) => ball.pdf(p, object.instance == receiver.object, wi, distance),
+                    Some(Piece::Face(face)) => face.pdf(p, distance),
+                    Some(Piece::Ring(ring)) => ring.pdf(p, wi, distance),
+                    None => 0.0,
+                }
+            }
             Emitter::Light => match self.placed[number as usize].as_ref().map(|placed| &placed.form) {
                 Some(Form::Rectangle { shape, .. }) => shape.pdf(p, distance),
                 Some(Form::Disk(disk)) => disk.pdf(p, distance),
-                Some(Form::Ellipsoid(ball)) => ball.pdf(p, wi, distance),
+                Some(Form::Ellipsoid(ball)) => ball.pdf(p, false, wi, distance),
                 Some(Form::Tube(tube)) => tube.pdf(p, wi),
                 Some(Form::Distant(sky)) => sky.pdf(),
                 Some(Form::Dome(dome)) => dome.pdf(p, chooser.normal, wi),

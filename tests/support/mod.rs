@@ -2,6 +2,8 @@
 
 #![allow(dead_code, unreachable_pub, reason = "every test file includes this module and uses its own part")]
 
+pub mod transport;
+
 use std::collections::BTreeMap;
 
 use abbe::film::Film;

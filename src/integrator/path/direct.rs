@@ -1,7 +1,7 @@
 //! Light that a surface receives from sampled points of lights.
 
 use super::state::{Scatterer, State};
-use super::tracer::{Tracer, has_factors};
+use super::tracer::Tracer;
 use crate::bsdf::{self, Evaluated};
 use crate::geometry::Ray;
 use crate::integrator::light_path::Event;
@@ -37,7 +37,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         let mut f = surface.bsdf.evaluate(surface.wo, wi);
         let source = self.setting.lighting.light(light.light);
         if let Some(source) = source
-            && has_factors(source)
+            && source.has_factors()
         {
             f.diffuse *= source.diffuse as f32;
             f.glossy *= source.specular as f32;
@@ -49,7 +49,8 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             return;
         }
         let Some(through) = self.visibility(walk, surface, light, source, state, numbers) else { return };
-        let weight = match (light.is_delta, DISPERSIVE) {
+        let is_sampled_alone = light.is_delta || source.is_some_and(|source| !source.has_natural_shadows());
+        let weight = match (is_sampled_alone, DISPERSIVE) {
             (true, true) => 1.0 / (state.r * light.pdf).mean(),
             (true, false) => 1.0 / light.pdf,
             (false, true) => 1.0 / (state.r * (f.pdf + SampledSpectrum::splat(light.pdf))).mean(),

@@ -22,7 +22,7 @@ use crate::integrator::lanes::{Laws, PathMedia};
 use crate::integrator::light_path::{self, Event, Expression};
 use crate::integrator::surface;
 use crate::integrator::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
-use crate::light::{Light, Shape};
+use crate::light::Shape;
 use crate::lighting::{LightHit, LightId, Lighting, Receiver};
 use crate::ray::{RayStart, ScatterKind, mirror, refract_or_reflect};
 use crate::sampler::PathSampler;
@@ -49,13 +49,6 @@ pub(super) struct Setting<'a> {
     pub(super) plate: Option<&'a Plate>,
     pub(super) guide: Option<&'a Guide>,
     pub(super) limits: DepthLimits,
-}
-
-/// Whether a light shines on diffuse and specular materials differently from what it is.
-pub(super) fn has_factors(light: &Light) -> bool {
-    #[expect(clippy::float_cmp, reason = "1 is what nobody authored")]
-    let factors = light.diffuse != 1.0 || light.specular != 1.0;
-    factors
 }
 
 /// Traces paths on one thread.
@@ -157,13 +150,23 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             return;
         }
         let emission = self.emission(met.light);
+        let light = lighting.light(met.light);
+        let is_direct = state.smooth_events == 0;
+        let mut seen = met.radiance;
+        if state.object.is_some()
+            && let Some(light) = light.filter(|light| light.has_factors())
+        {
+            let scattered = state.vertex.as_ref().filter(|_| is_direct);
+            let diffuse_share = scattered.map_or(SampledSpectrum::ZERO, |vertex| vertex.diffuse_share);
+            let specular = SampledSpectrum::splat(light.specular as f32);
+            seen *= specular + diffuse_share * (light.diffuse - light.specular) as f32;
+        }
         let Some(vertex) = &state.vertex else {
             // Nothing but this way leads there.
-            self.ledger.add(state.carried::<DISPERSIVE>() * met.radiance, emission);
+            self.ledger.add(state.carried::<DISPERSIVE>() * seen, emission);
             return;
         };
         // By way of smooth surfaces the guide finds it, if anything does.
-        let is_direct = state.smooth_events == 0;
         let pdf = match (self.setting.guide, vertex.look) {
             _ if is_direct => lighting.pdf(&vertex.receiver, direction, met),
             (Some(guide), Some(Look { region, probability })) => {
@@ -171,13 +174,9 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             }
             _ => 0.0,
         };
-        let mut seen = met.radiance;
-        if let Some(light) = lighting.light(met.light)
-            && is_direct
-            && has_factors(light)
-        {
-            let specular = SampledSpectrum::splat(light.specular as f32);
-            seen *= specular + vertex.diffuse_share * (light.diffuse - light.specular) as f32;
+        if is_direct && pdf > 0.0 && light.is_some_and(|light| !light.has_natural_shadows()) {
+            // What blocks it is not what blocks rays: all of it is sampled.
+            return;
         }
         let weight = if DISPERSIVE {
             1.0 / (state.r + vertex.r_over_pdf * pdf).mean()

@@ -28,6 +28,8 @@ enum Seen {
     Cap { distance: f64, axis: DVec3, one_minus_cosine: f64 },
     /// From inside, where that shines.
     Inside,
+    /// From the point of it in this direction: all the rest, through the inside.
+    Itself(DVec3),
 }
 
 impl Seen {
@@ -35,6 +37,7 @@ impl Seen {
         match self {
             Self::Cap { one_minus_cosine, .. } => 1.0 / (2.0 * PI * one_minus_cosine),
             Self::Inside => 1.0 / (4.0 * PI),
+            Self::Itself(_) => 1.0 / (2.0 * PI),
         }
     }
 }
@@ -66,8 +69,12 @@ impl Ellipsoid {
         self.directions.local_from_render * (p - self.center)
     }
 
-    fn seen(&self, origin: DVec3) -> Option<Seen> {
+    /// `on_it`: from a point of its surface, whichever side rounding has put that on.
+    fn seen(&self, origin: DVec3, on_it: bool) -> Option<Seen> {
         let distance = origin.length();
+        if on_it {
+            return self.is_two_sided.then(|| Seen::Itself(origin / distance));
+        }
         if distance <= 1.0 {
             return self.is_two_sided.then_some(Seen::Inside);
         }
@@ -76,12 +83,14 @@ impl Ellipsoid {
         Some(Seen::Cap { distance, axis: -origin / distance, one_minus_cosine })
     }
 
-    pub(in crate::lighting) fn sample(&self, p: DVec3, [u, v]: [f64; 2]) -> Option<Toward> {
+    /// For the point `p`, which may be one of the surface itself.
+    pub(in crate::lighting) fn sample(&self, p: DVec3, on_it: bool, [u, v]: [f64; 2]) -> Option<Toward> {
         let origin = self.local(p);
-        let seen = self.seen(origin)?;
+        let seen = self.seen(origin, on_it)?;
         let (axis, height) = match seen {
             Seen::Cap { axis, one_minus_cosine, .. } => (axis, u * one_minus_cosine),
             Seen::Inside => (DVec3::Z, 2.0 * u),
+            Seen::Itself(place) => (-place, u),
         };
         let (sine, cosine) = ((height * (2.0 - height)).max(0.0).sqrt(), 1.0 - height);
         let [x, y] = frame(axis);
@@ -97,6 +106,7 @@ impl Ellipsoid {
                 let aside = (origin + to_nearest * direction).length();
                 to_nearest + ((1.0 - aside) * (1.0 + aside)).max(0.0).sqrt()
             }
+            Seen::Itself(_) => 2.0 * cosine,
         };
         let image = self.directions.render_from_local * direction;
         let stretch = image.length();
@@ -105,9 +115,9 @@ impl Ellipsoid {
     }
 
     /// Of the direction `wi`, which meets it at `distance`: 0 on the far side, which is only seen where the near one is not there.
-    pub(in crate::lighting) fn pdf(&self, p: DVec3, wi: DVec3, distance: f64) -> f64 {
+    pub(in crate::lighting) fn pdf(&self, p: DVec3, on_it: bool, wi: DVec3, distance: f64) -> f64 {
         let origin = self.local(p);
-        let Some(seen) = self.seen(origin) else { return 0.0 };
+        let Some(seen) = self.seen(origin, on_it) else { return 0.0 };
         let d = self.directions.local_from_render * wi;
         let shrink = d.length();
         // Beyond the middle of the chord.

@@ -16,6 +16,9 @@ const SMALLEST: f64 = 1.0 / 1_048_576.0;
 /// |cos| of the sides' angle up to which they count as perpendicular: rounding of a few products.
 const PERPENDICULAR: f64 = 1e-12;
 
+/// Distance from the plane, over the longer side, up to which rounding may have put a point of it.
+const IN_PLANE: f64 = 1e-9;
+
 /// A parallelogram that shines.
 #[derive(Clone, Debug)]
 pub(in crate::lighting) struct Rectangle {
@@ -90,6 +93,12 @@ impl Rectangle {
     pub(in crate::lighting) fn coordinates(&self, point: DVec3) -> [f64; 2] {
         let q = point - self.center;
         self.dual.map(|dual| q.dot(dual))
+    }
+
+    /// Whether a point of an object that it is a face of is in its plane: none of its light goes there.
+    pub(in crate::lighting) fn is_in_plane(&self, p: DVec3) -> bool {
+        let height = (p - self.center).dot(self.normal);
+        height.abs() <= IN_PLANE * self.lengths[0].max(self.lengths[1])
     }
 
     /// Height of a point over the plane; `None` on the side that is dark and in the plane.

@@ -24,7 +24,7 @@ impl Form {
         match self {
             Self::Rectangle(s) => s.sample(p, u),
             Self::Disk(s) => s.sample(p, u),
-            Self::Ellipsoid(s) => s.sample(p, u),
+            Self::Ellipsoid(s) => s.sample(p, false, u),
             Self::Tube(s) => s.sample(p, u),
             Self::Triangle(s) => s.sample(p, u).map(|(toward, _)| toward),
         }
@@ -35,7 +35,7 @@ impl Form {
         match self {
             Self::Rectangle(s) => s.meet(p, d).map(|(t, _)| (t, s.pdf(p, t))),
             Self::Disk(s) => s.meet(p, d).map(|t| (t, s.pdf(p, t))),
-            Self::Ellipsoid(s) => s.meet(p, d).map(|t| (t, s.pdf(p, d, t))),
+            Self::Ellipsoid(s) => s.meet(p, d).map(|t| (t, s.pdf(p, false, d, t))),
             Self::Tube(s) => s.meet(p, d).map(|t| (t, s.pdf(p, d))),
             Self::Triangle(s) => {
                 let [a, b, c] = s.corners();
@@ -270,12 +270,30 @@ fn what_glows_on_both_sides_is_seen_from_inside() {
     let mut random = Random(3);
     let p = DVec3::new(1.5, 0.7, -0.3);
     for _ in 0..100 {
-        let Toward { wi, distance, pdf_solid_angle } = ball.sample(p, random.pair()).unwrap();
+        let Toward { wi, distance, pdf_solid_angle } = ball.sample(p, false, random.pair()).unwrap();
         assert!(((p + distance * wi - DVec3::X).length() - 2.0).abs() < 1e-12);
         assert!(
             (pdf_solid_angle * 4.0 * PI - 1.0).abs() < 1e-12
-                && (ball.pdf(p, wi, distance) / pdf_solid_angle - 1.0).abs() < 1e-12
+                && (ball.pdf(p, false, wi, distance) / pdf_solid_angle - 1.0).abs() < 1e-12
         );
+    }
+}
+
+#[test]
+fn a_point_of_a_ball_sees_the_rest_of_it_through_the_inside() {
+    let center = DVec3::new(1.0, -2.0, 0.5);
+    let axes = DMat3::from_diagonal(DVec3::splat(2.0));
+    let [glowing, dark] = [true, false].map(|is_two_sided| Ellipsoid::new(center, axes, is_two_sided));
+    let mut random = Random(5);
+    for _ in 0..100 {
+        // Rounding has put about half of these points outside.
+        let n = random.direction();
+        let p = center + 2.0 * n;
+        let Toward { wi, distance, pdf_solid_angle } = glowing.sample(p, true, random.pair()).unwrap();
+        assert!((distance + 4.0 * wi.dot(n)).abs() < 1e-12 && wi.dot(n) < 0.0, "{distance}");
+        assert!((pdf_solid_angle * 2.0 * PI - 1.0).abs() < 1e-12);
+        assert!((glowing.pdf(p, true, wi, distance) / pdf_solid_angle - 1.0).abs() < 1e-12);
+        assert!(dark.sample(p, true, random.pair()).is_none() && dark.pdf(p, true, wi, distance) <= 0.0);
     }
 }
 
