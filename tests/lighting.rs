@@ -376,15 +376,18 @@ fn geometry_that_shines_is_as_bright_as_a_light() {
     let place = at(1.0, 1.0, 5.0);
     let sent = |scene: &Scene| {
         let view = View::new(scene, ORIGIN);
+        // Receivers are the first object, which is not what shines.
         irradiance(&Lighting::new(&view).unwrap(), &receiver(p, Some(n)), n, 10_000)
     };
     let expected = sent(&scene(vec![light("/L", sphere(0.7), place)]));
     let mut s = Stagehand::new();
+    s.wall(-50.0, 1.0, None);
     let white = glowing(&mut s, "/World/Glow", [1.0; 3]);
     s.sphere("/World/Ball", 0.7, place, Some(white));
     close(sent(&s.build()), expected, 2e-3, "glow");
     for (normalize, intensity) in [(false, 1.0), (true, 4.0 * PI * 0.49)] {
         let mut s = Stagehand::new();
+        s.wall(-50.0, 1.0, None);
         let black = s.diffuse("/World/Black");
         s.sphere("/World/Ball", 0.7, place, Some(black));
         let shape =
