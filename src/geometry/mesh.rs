@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
 use super::Buffer;
@@ -303,8 +303,8 @@ impl Mesh {
     pub(super) fn reach(&self, primitive: u32, time: f64) -> f64 {
         match self.deformed(time) {
             None => {
-                let larger = |reach: f32, x: &f32| if x.abs() > reach { x.abs() } else { reach };
-                self.corners_f32(primitive).as_flattened().iter().fold(0.0, larger).into()
+                let [a, b, c] = self.corners_f32(primitive).map(|p| Vec3A::from_array(p).abs());
+                a.max(b).max(c).max_element().into()
             }
             Some(_) => self.corners(primitive, time).iter().map(|p| p.abs().max_element()).fold(0.0, f64::max),
         }

@@ -29,28 +29,27 @@ impl Placed<'_> {
         let point = (1.0 - v - w) * a + v * b + w * c;
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let n_g = self.covector(normal).normalize();
-        let flat = LocalSurface { n_g, n_s: n_g, curvature: Curvature::Plane, field: NormalField::Flat };
-        let surface = mesh.normals(hit.primitive, self.time).and_then(|normals| {
-            let [s0, s1, s2] = normals.map(|n| self.covector(n));
-            let (d1, d2) = (s1 - s0, s2 - s0);
-            let vector = s0 + v * d1 + w * d2;
-            let largest = s0.length().max(s1.length()).max(s2.length());
-            if vector.length() <= VANISHING * largest || vector.dot(n_g) <= 0.0 {
-                return None;
-            }
-            let n_s = vector.normalize();
-            if d1 == DVec3::ZERO && d2 == DVec3::ZERO {
-                return Some(LocalSurface { n_s, ..flat });
-            }
-            // Edges from object space: there they are exact, while corners far from render space's zero are rounded.
-            let (e1, e2) = (self.linear * (corners[1] - corners[0]), self.linear * (corners[2] - corners[0]));
-            let m = e1.cross(e2);
-            // ∇β1 and ∇β2, so that β1(q − a) = ∇β1·(q − a).
-            let (g1, g2) = (e2.cross(m) / m.length_squared(), m.cross(e1) / m.length_squared());
-            let gradient = outer(d1, g1) + outer(d2, g2);
-            Some(LocalSurface { n_s, field: NormalField::Linear { vector, gradient }, ..flat })
-        });
-        (point, surface.unwrap_or(flat))
+        // Written where it is returned: it is long.
+        let surface = |n_s, field| (point, LocalSurface { n_g, n_s, curvature: Curvature::Plane, field });
+        let Some(normals) = mesh.normals(hit.primitive, self.time) else { return surface(n_g, NormalField::Flat) };
+        let [s0, s1, s2] = normals.map(|n| self.covector(n));
+        let (d1, d2) = (s1 - s0, s2 - s0);
+        let vector = s0 + v * d1 + w * d2;
+        let largest = s0.length().max(s1.length()).max(s2.length());
+        if vector.length() <= VANISHING * largest || vector.dot(n_g) <= 0.0 {
+            return surface(n_g, NormalField::Flat);
+        }
+        let n_s = vector.normalize();
+        if d1 == DVec3::ZERO && d2 == DVec3::ZERO {
+            return surface(n_s, NormalField::Flat);
+        }
+        // Edges from object space: there they are exact, while corners far from render space's zero are rounded.
+        let (e1, e2) = (self.linear * (corners[1] - corners[0]), self.linear * (corners[2] - corners[0]));
+        let m = e1.cross(e2);
+        // ∇β1 and ∇β2, so that β1(q − a) = ∇β1·(q − a).
+        let (g1, g2) = (e2.cross(m) / m.length_squared(), m.cross(e1) / m.length_squared());
+        let gradient = outer(d1, g1) + outer(d2, g2);
+        surface(n_s, NormalField::Linear { vector, gradient })
     }
 
     /// ∂p/∂u and ∂p/∂v of the texture coordinates; `None` where there are none.

@@ -97,7 +97,7 @@ impl ShearedRay {
     }
 
     /// The crossing of the ray's line with a triangle.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn intersect(&self, corners: [impl Corner; 3]) -> Option<TriangleHit> {
         let (a, az) = self.project(corners[0]);
         let (b, bz) = self.project(corners[1]);

@@ -170,27 +170,34 @@ impl Tree {
                 continue;
             }
             let node = &self.nodes[item.first as usize];
-            let (near, mut lanes) = slabs.entries(node, farthest);
-            // Insertion sort of at most four, farthest deepest on the stack.
+            let (near, lanes) = slabs.entries(node, farthest);
             let Some(waiting) = stack[len..].first_chunk_mut::<4>() else {
                 unreachable!("the tree says how deep it is")
             };
-            let mut added = 0;
-            while lanes != 0 {
-                let lane = (lanes.trailing_zeros() & 3) as usize;
-                lanes &= lanes - 1;
-                let new = Waiting { near: near[lane], first: node.first[lane], count: node.count[lane] };
-                let mut at = added;
-                while at > 0 && waiting[(at - 1) & 3].near < new.near {
-                    waiting[at & 3] = waiting[(at - 1) & 3];
-                    at -= 1;
-                }
-                waiting[at & 3] = new;
-                added += 1;
+            // Farthest deepest on the stack, and those that are not passed above its end.
+            for (waiting, lane) in waiting.iter_mut().zip(far_to_near(near, lanes)) {
+                *waiting = Waiting { near: near[lane], first: node.first[lane], count: node.count[lane] };
             }
-            len += added;
+            len += usize::from(PASSED[lanes as usize & 15]);
         }
     }
+}
+
+/// How many bits are set.
+const PASSED: [u8; 16] = [0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4];
+
+/// The lanes by distance, those without a bit last. A sorting network: branches would be coin tosses.
+#[inline(always)]
+fn far_to_near(near: [f32; 4], lanes: u32) -> [usize; 4] {
+    // Distances are not negative: their bits are in their order.
+    let mut keys: [u64; 4] = std::array::from_fn(|lane| {
+        let is_passed = u64::from(lanes >> lane & 1);
+        is_passed << 34 | u64::from(near[lane].to_bits()) << 2 | lane as u64
+    });
+    for (i, j) in [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)] {
+        (keys[i], keys[j]) = (keys[i].max(keys[j]), keys[i].min(keys[j]));
+    }
+    keys.map(|key| (key & 3) as usize)
 }
 
 impl Slabs {

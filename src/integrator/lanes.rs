@@ -114,7 +114,10 @@ impl Law<'_> {
         let ior = self.dispersion.at(wavelengths.hero()).ior;
         let is_dispersive = !self.dispersion.is_constant();
         let iors = if is_dispersive {
-            SampledSpectrum::from_fn(|lane| self.dispersion.at(wavelengths.lane(lane)).ior as f32)
+            SampledSpectrum::from_fn(|lane| match lane {
+                0 => ior as f32,
+                _ => self.dispersion.at(wavelengths.lane(lane)).ior as f32,
+            })
         } else {
             SampledSpectrum::splat(ior as f32)
         };

@@ -146,7 +146,7 @@ impl<'a> BruteForce<'a> {
             let mut far = inside.map(|_| walk.far_side(&met, &mut self.counters));
             let far_medium = far.as_ref().map_or(medium, |far| self.media.of(far.medium));
             let interface = Interface { ior_i: medium.iors, ior_t: far_medium.iors };
-            let at = surface::at(task.view, &ray, &met, wavelengths, interface);
+            let at = task.view.surface(&met.hit, met.material_id, wavelengths, interface);
             let [u_there, u_light, u_x, u_y] = numbers.draw();
             if walk.crossings > MAX_CROSSINGS {
                 return (radiance, alpha);
@@ -166,10 +166,11 @@ impl<'a> BruteForce<'a> {
             if lighting.replaces_material(&met.hit) {
                 return (radiance, 1.0);
             }
+            let (normal, tangent) = surface::normal_and_tangent(task.view, &ray, &met, &at);
             let facing = |n: DVec3| if ray.direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
             let n_g = facing(met.surface.n_g);
-            let n_s = Some(facing(at.normal)).filter(|n| ray.direction.dot(*n) < 0.0).unwrap_or(n_g);
-            let frame = at.tangent.map_or_else(|| Frame::about(n_s), |tangent| Frame::along(n_s, tangent));
+            let n_s = Some(facing(normal)).filter(|n| ray.direction.dot(*n) < 0.0).unwrap_or(n_g);
+            let frame = tangent.map_or_else(|| Frame::about(n_s), |tangent| Frame::along(n_s, tangent));
             let wo = frame.to_local(-ray.direction);
             let bsdf = Bsdf::new(&at.parameters);
             let receiver = Receiver { point: met.point, normal: None, object: met.hit.instance, time: ray.time };

@@ -1,51 +1,32 @@
-//! What a ray has met, as light transport needs it: the surface's parameters with its normal and tangent in render space.
+//! What a ray has met, as light transport needs it: the surface's normal and tangent in render space, what it lets through.
 
 use glam::DVec3;
 
 use super::walk::SurfacePoint;
-use crate::bsdf::{Interface, Parameters};
+use crate::bsdf::Parameters;
 use crate::geometry::{Hit, Ray};
 use crate::sampler::PathSampler;
+use crate::scene::material::SurfaceAt;
 use crate::scene::view::View;
-use crate::spectrum::{SampledSpectrum, Wavelengths};
+use crate::spectrum::SampledSpectrum;
 
-/// A surface at a point.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Met<const N: usize> {
-    /// What it is made of.
-    pub(super) parameters: Parameters<N>,
-    /// Share of it that is there.
-    pub(super) presence: f32,
-    /// Shading normal, on the outside as authored.
-    pub(super) normal: DVec3,
-    /// Along what is anisotropic.
-    pub(super) tangent: Option<DVec3>,
-    /// Whether light comes from behind.
-    pub(super) transmits: bool,
-}
-
-/// The surface that a ray met.
-pub(super) fn at<const N: usize>(
+/// Shading normal of the surface that a ray met, on the outside as authored, and the tangent along which it is anisotropic.
+pub(super) fn normal_and_tangent<const N: usize>(
     view: &View<'_>,
     ray: &Ray,
     met: &SurfacePoint,
-    wavelengths: &Wavelengths<N>,
-    interface: Interface<N>,
-) -> Met<N> {
-    let at = view.surface(&met.hit, met.material_id, wavelengths, interface);
-    let (mut normal, mut tangent) = (met.surface.n_s, None);
-    if at.has_direction() {
-        let frame = view.shading_frame(&met.hit, ray.time, &met.surface, &at);
-        (normal, tangent) = (frame.normal, Some(frame.tangent));
+    at: &SurfaceAt<N>,
+) -> (DVec3, Option<DVec3>) {
+    if !at.has_direction() {
+        return (met.surface.n_s, None);
     }
-    let parameters = at.parameters;
-    Met {
-        parameters,
-        presence: at.presence,
-        normal,
-        tangent,
-        transmits: parameters.transmission > 0.0 || !parameters.diffuse_transmission.is_black(),
-    }
+    let frame = view.shading_frame(&met.hit, ray.time, &met.surface, at);
+    (frame.normal, Some(frame.tangent))
+}
+
+/// Whether light comes from behind.
+pub(super) fn transmits<const N: usize>(parameters: &Parameters<N>) -> bool {
+    parameters.transmission > 0.0 || !parameters.diffuse_transmission.is_black()
 }
 
 /// Tells the crossings of one straight way apart: a ray enters and leaves a sphere by the same primitive.

@@ -225,6 +225,11 @@ impl<'a> View<'a> {
         if surface.is_present() { 1.0 } else { self.with_results(surface, hit, |results| surface.presence(results)) }
     }
 
+    /// Whether surfaces with material `id` are there all over and never smooth, as far as is known without a look.
+    pub fn is_rough(&self, id: u32) -> bool {
+        self.surface_of(id).is_rough()
+    }
+
     fn surface_of(&self, id: u32) -> &'a Surface {
         match id.checked_sub(1) {
             Some(index) => &self.scene.materials[index as usize].surface,

@@ -12,7 +12,7 @@
 
 use std::f32::consts::TAU;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 
 /// Photons of a region.
 const REGION: usize = 32;
@@ -49,44 +49,52 @@ pub(super) struct Photon {
     pub(super) flux: f32,
 }
 
-/// Even directions about an axis.
-#[derive(Clone, Copy, Debug)]
-struct Cap {
-    /// 1 − cos and sin² of the half-angle.
-    height: f32,
-    sin2: f32,
-    /// The cap's share over its solid angle, 1/sr.
-    density: f32,
-}
-
-impl Cap {
-    fn new(height: f32, share: f32) -> Self {
-        Self { height, sin2: height * (2.0 - height), density: share / (TAU * height) }
-    }
-}
-
 /// Directions towards a point, and around.
 #[derive(Clone, Copy, Debug)]
 struct Lobe {
     /// The point, relative to the region's centre.
     toward: Vec3,
-    /// A narrow and a wide one.
-    caps: [Cap; 2],
+    /// 1 − cos of the half-angles of a narrow cap and a wide one.
+    heights: [f32; 2],
+    share: f32,
     /// Shares up to this one with it, 0..=1.
     up_to: f32,
 }
 
-impl Lobe {
-    /// The density of a direction from `at`.
+/// The densities of four lobes, lane by lane.
+#[derive(Clone, Copy, Debug)]
+struct Lobes {
+    toward: [Vec4; 3],
+    /// Of the narrow caps and the wide ones: sin² of the half-angle, and the cap's share over its solid angle, 1/sr.
+    caps: [(Vec4, Vec4); 2],
+}
+
+impl Lobes {
+    /// Of up to four lobes; further lanes have no density.
+    fn new(lobes: &[Lobe]) -> Self {
+        let lanes = |of: &dyn Fn(&Lobe) -> f32| Vec4::from_array(std::array::from_fn(|i| lobes.get(i).map_or(0.0, of)));
+        let cap = |cap: usize, part: f32| {
+            let sin2 = lanes(&|lobe| lobe.heights[cap] * (2.0 - lobe.heights[cap]));
+            (sin2, lanes(&|lobe| part * lobe.share / (TAU * lobe.heights[cap])))
+        };
+        let toward = [0, 1, 2].map(|axis| lanes(&|lobe| lobe.toward[axis]));
+        Self { toward, caps: [cap(0, 1.0 - WIDE), cap(1, WIDE)] }
+    }
+
+    /// The densities of a direction from `at`.
     #[inline]
-    fn pdf(&self, at: Vec3, direction: Vec3) -> f32 {
-        let toward = self.toward - at;
-        if toward.dot(direction) <= 0.0 {
-            return 0.0;
-        }
+    fn pdf(&self, at: Vec3, direction: Vec3) -> Vec4 {
+        let [x, y, z] = self.toward;
+        let (x, y, z) = (x - at.x, y - at.y, z - at.z);
+        let along = x * direction.x + y * direction.y + z * direction.z;
         // The sine, by which small angles do not lose digits.
-        let (across2, length2) = (toward.cross(direction).length_squared(), toward.length_squared());
-        self.caps.iter().map(|cap| if across2 < cap.sin2 * length2 { cap.density } else { 0.0 }).sum()
+        let across =
+            [y * direction.z - z * direction.y, z * direction.x - x * direction.z, x * direction.y - y * direction.x];
+        let [across2, length2] = [across, [x, y, z]].map(|[x, y, z]| x * x + y * y + z * z);
+        let within = |(sin2, density): (Vec4, Vec4)| {
+            Vec4::select(across2.cmplt(sin2 * length2) & along.cmpgt(Vec4::ZERO), density, Vec4::ZERO)
+        };
+        within(self.caps[0]) + within(self.caps[1])
     }
 }
 
@@ -101,6 +109,8 @@ struct Region {
     /// Probability with which a path of full weight looks for light from here.
     probability: f32,
     lobes: Vec<Lobe>,
+    /// The same by four.
+    densities: Vec<Lobes>,
 }
 
 /// Which region.
@@ -207,7 +217,7 @@ impl Guide {
         let chosen = region.lobes.partition_point(|lobe| lobe.up_to <= u_lobe).min(region.lobes.len() - 1);
         let lobe = &region.lobes[chosen];
         let axis = (lobe.toward - at).try_normalize()?;
-        let height = lobe.caps[usize::from(u_cap < WIDE)].height * u[0];
+        let height = lobe.heights[usize::from(u_cap < WIDE)] * u[0];
         let (sin, cos) = ((height * (2.0 - height)).sqrt(), 1.0 - height);
         let (x, y) = axis.any_orthonormal_pair();
         let (sin_phi, cos_phi) = libm::sincosf(TAU * u[1]);
@@ -246,19 +256,20 @@ impl Region {
             // Of unit vectors |a − b|² = 2 (1 − cos).
             let mut heights: Vec<f32> =
                 directions.iter().map(|d| 0.5 * (*d - directions[i]).length_squared()).collect();
-            heights.sort_unstable_by(f32::total_cmp);
-            let [narrow, wide] = NEIGHBORS.map(|neighbor| heights[neighbor].clamp(NARROWEST, WIDEST));
+            let (nearer, &mut wide, _) = heights.select_nth_unstable_by(NEIGHBORS[1], f32::total_cmp);
+            let (_, &mut narrow, _) = nearer.select_nth_unstable_by(NEIGHBORS[0], f32::total_cmp);
+            let heights = [narrow, wide].map(|height| height.clamp(NARROWEST, WIDEST));
             let share = photons[i].flux / total;
             up_to += share;
-            let caps = [Cap::new(narrow, (1.0 - WIDE) * share), Cap::new(wide, WIDE * share)];
-            Lobe { toward: towards[i], caps, up_to }
+            Lobe { toward: towards[i], heights, share, up_to }
         };
-        let lobes = (0..photons.len()).map(lobe).collect();
+        let lobes: Vec<Lobe> = (0..photons.len()).map(lobe).collect();
+        let densities = lobes.chunks(4).map(Lobes::new).collect();
         // Surfaces are flat: the area is that of the two largest extents.
         let DVec3 { x, y, z } = max - min;
         let area = (x * y).max(y * z).max(z * x);
         let irradiance = (f64::from(total) / area.max(f64::MIN_POSITIVE)) as f32;
-        let region = Self { center, half_extent, flux: total, irradiance, probability: 1.0, lobes };
+        let region = Self { center, half_extent, flux: total, irradiance, probability: 1.0, lobes, densities };
         // 1 over the mean density of its own directions.
         let mean: f32 =
             (photons.iter().zip(&directions)).map(|(p, d)| p.flux / total * region.pdf(Vec3::ZERO, *d)).sum();
@@ -266,6 +277,6 @@ impl Region {
     }
 
     fn pdf(&self, at: Vec3, direction: Vec3) -> f32 {
-        self.lobes.iter().map(|lobe| lobe.pdf(at, direction)).sum()
+        self.densities.iter().map(|lobes| lobes.pdf(at, direction)).sum::<Vec4>().element_sum()
     }
 }

@@ -115,6 +115,12 @@ impl<const N: usize> State<N> {
         }
     }
 
+    /// A photon that comes from `from` has arrived, if it came by way of a smooth surface.
+    pub(super) fn arrive<const DISPERSIVE: bool>(&mut self, point: DVec3, from: DVec3) {
+        let arrival = Arrival { point, from, carried: self.carried::<DISPERSIVE>() };
+        self.arrival = (self.smooth_events > 0).then_some(arrival);
+    }
+
     /// A smooth event; only what the guide may have found still has another way to be found.
     pub(super) fn pass_smoothly(&mut self) {
         self.smooth_events += 1;

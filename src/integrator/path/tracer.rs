@@ -98,7 +98,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     pub(super) fn follow(&mut self, walk: &mut Walk<'a>, state: &mut State<N>, numbers: &mut PathSampler) {
         let Setting { lighting, .. } = self.setting;
         loop {
-            let met = walk.advance(&mut self.counters);
+            let mut met = walk.advance(&mut self.counters);
             let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
             let medium = self.media.of(walk.media.current());
             let ray = walk.ray;
@@ -110,7 +110,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                     self.meet(state, ray.direction, &light);
                 });
             }
-            let Some(mut met) = met else {
+            let Some(met) = &mut met else {
                 // What absorbs lets nothing through from infinitely far.
                 let absorbs = |sigma: &SampledSpectrum<N>| sigma.0.iter().any(|&sigma| sigma > 0.0);
                 if state.meets_lights() && !medium.absorption.as_ref().is_some_and(absorbs) {
@@ -121,12 +121,12 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             if let Some(through) = medium.transmittance(limit) {
                 state.throughput *= through;
             }
-            walk.in_contact(&mut met, &mut self.counters);
+            walk.in_contact(met, &mut self.counters);
             if walk.crossings > MAX_CROSSINGS {
                 self.counters.exhausted += 1;
                 break;
             }
-            if !self.event(walk, &met, state, numbers) {
+            if !self.event(walk, met, state, numbers) {
                 break;
             }
         }
@@ -215,12 +215,20 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     ) -> bool {
         let Setting { view, lighting, limits, guide, .. } = self.setting;
         let inside = view.inside(&met.hit, met.material_id);
+        if state.purpose != Purpose::Picture
+            && inside.is_none()
+            && view.is_rough(met.material_id)
+            && !lighting.is_empty()
+        {
+            self.arrive(walk, met, state);
+            return false;
+        }
         let medium = self.media.of(walk.media.current());
         // What lies behind: another medium only where the surface bounds one.
         let mut far = inside.map(|_| walk.far_side(met, &mut self.counters));
         let far_medium = far.as_ref().map_or(medium, |far| self.media.of(far.medium));
         let interface = Interface { ior_i: medium.iors, ior_t: far_medium.iors };
-        let at = surface::at(view, &walk.ray, met, &state.wavelengths, interface);
+        let at = view.surface(&met.hit, met.material_id, &state.wavelengths, interface);
         let is_there = at.presence >= 1.0 || numbers.of(surface::crossing(&met.hit)) < at.presence;
         if !is_there {
             walk.cross(met);
@@ -249,13 +257,14 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         }
         state.object = Some(met.hit.instance);
         // The shading normal decides how light is scattered, the geometric one which side it is on.
+        let (normal, tangent) = surface::normal_and_tangent(view, &walk.ray, met, &at);
         let toward = |n: DVec3| if direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
         let n_g = toward(met.surface.n_g);
-        let mut normal = toward(at.normal);
+        let mut normal = toward(normal);
         if direction.dot(normal) >= 0.0 {
             normal = n_g;
         }
-        let frame = match at.tangent {
+        let frame = match tangent {
             Some(tangent) => Frame::along(normal, tangent),
             None => Frame::about(normal),
         };
@@ -269,7 +278,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             bsdf,
             receiver: Receiver {
                 point: met.point,
-                normal: (!at.transmits).then(|| n_g.as_vec3()),
+                normal: (!surface::transmits(&at.parameters)).then(|| n_g.as_vec3()),
                 object: met.hit.instance,
                 time: walk.ray.time,
             },
@@ -280,9 +289,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             match state.purpose {
                 Purpose::Focused => return false,
                 Purpose::Photon => {
-                    let (from, carried) = (walk.ray.origin, state.carried::<DISPERSIVE>());
-                    let arrival = Arrival { point: met.point, from, carried };
-                    state.arrival = (state.smooth_events > 0).then_some(arrival);
+                    state.arrive::<DISPERSIVE>(met.point, walk.ray.origin);
                     return false;
                 }
                 Purpose::Picture => {
@@ -379,6 +386,19 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             walk.turn(met, turned, passes);
         }
         self.survives(state, u_roulette)
+    }
+
+    /// What looks for a surface that is not smooth has met one: of its material no more has to be known.
+    fn arrive(&mut self, walk: &Walk<'a>, met: &SurfacePoint, state: &mut State<N>) {
+        let lighting = self.setting.lighting;
+        if state.meets_lights()
+            && let Some(emitted) = lighting.emitted(&walk.ray, &met.hit, &state.wavelengths)
+        {
+            self.meet(state, walk.ray.direction, &emitted);
+        }
+        if state.purpose == Purpose::Photon && !lighting.replaces_material(&met.hit) {
+            state.arrive::<DISPERSIVE>(met.point, walk.ray.origin);
+        }
     }
 
     /// Roulette: a path goes on with the probability of what it still carries.

@@ -1,8 +1,7 @@
 //! The parallelogram, sampled by the solid angle that it subtends if it is a rectangle.
 //!
 //! C. Ureña, M. Fajardo, A. King, "An area-preserving parametrization for spherical rectangles", CGF 32(4), 2013; the symbols
-//! are theirs. Where the solid angle is so small that nothing is left of it in the sum of angles, and for a sheared
-//! rectangle, points are even over the area.
+//! are theirs. From afar, where it makes next to no difference, and for a sheared rectangle, points are even over the area.
 
 use std::f64::consts::PI;
 
@@ -13,6 +12,9 @@ use crate::math::trig::sin_cos;
 
 /// Below this solid angle the area is sampled: the rounding of the angles, 2^-50, is 2^-30 of it.
 const SMALLEST: f64 = 1.0 / 1_048_576.0;
+/// From so many of its longer sides' halves on the area is sampled: from there the density of its points by angle, which goes with the
+/// cube of their distances, hardly differs, by 3 % in root mean square.
+const FAR: f64 = 64.0;
 /// |cos| of the sides' angle up to which they count as perpendicular: rounding of a few products.
 const PERPENDICULAR: f64 = 1e-12;
 
@@ -119,6 +121,12 @@ impl Rectangle {
         (seen.solid_angle >= SMALLEST).then_some(seen)
     }
 
+    /// The same where it is worth its while.
+    fn seen_from_near(&self, p: DVec3, height: f64) -> Option<Seen> {
+        let longer = self.lengths[0].max(self.lengths[1]);
+        if (p - self.center).length_squared() > FAR * FAR * longer * longer { None } else { self.seen(p, height) }
+    }
+
     /// How large it looks from a point, steradian; `None` where that is little and from where it is dark.
     pub(in crate::lighting) fn solid_angle(&self, p: DVec3) -> Option<f64> {
         self.seen(p, self.height(p)?).map(|seen| seen.solid_angle)
@@ -126,7 +134,7 @@ impl Rectangle {
 
     pub(in crate::lighting) fn sample(&self, p: DVec3, u: [f64; 2]) -> Option<Toward> {
         let height = self.height(p)?;
-        let (to, by_angle) = match self.seen(p, height) {
+        let (to, by_angle) = match self.seen_from_near(p, height) {
             Some(seen) => {
                 let [x, y] = seen.point(u).map(|a| a * height.abs());
                 (x * self.axes[0] + y * self.axes[1] - height * self.normal, Some(1.0 / seen.solid_angle))
@@ -145,7 +153,7 @@ impl Rectangle {
     /// Of the direction that meets it at `distance`.
     pub(in crate::lighting) fn pdf(&self, p: DVec3, distance: f64) -> f64 {
         let Some(height) = self.height(p) else { return 0.0 };
-        self.seen(p, height).map_or_else(|| self.by_area(height, distance), |seen| 1.0 / seen.solid_angle)
+        self.seen_from_near(p, height).map_or_else(|| self.by_area(height, distance), |seen| 1.0 / seen.solid_angle)
     }
 
     /// distance² / (area · cos), where cos = height / distance.

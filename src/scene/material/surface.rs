@@ -3,7 +3,7 @@
 //! A dialect states [`Layers`] of registers. They are compiled once: what is constant becomes a number or a reflectance, and
 //! everything else a result of one bundle of programs, so that a constant material runs none.
 
-use crate::bsdf::{Coat, Film, Interface, Metal, Parameters, Sheen};
+use crate::bsdf::{Coat, Film, Interface, Metal, Parameters, SMOOTH_ALPHA, Sheen};
 use crate::diagnostics::Diagnostics;
 use crate::optics::Dispersion;
 use crate::optics::reflectance::MeasuredReflectance;
@@ -528,6 +528,14 @@ impl Surface {
     /// Whether the surface is there all over, so that nothing has to be asked of it.
     pub fn is_present(&self) -> bool {
         matches!(self.presence.value, Source::Constant(share) if share >= 1.0)
+    }
+
+    /// Whether it is known without a look that the surface is there and not smooth: what reflects is diffuse or a rough interface.
+    pub fn is_rough(&self) -> bool {
+        let is_opaque = self.metalness.is_zero() && self.transmission.is_zero();
+        let is_bare = self.coat.is_none() && self.sheen.is_none();
+        let rough = |alpha: &Number| matches!(alpha.value, Source::Constant(alpha) if alpha >= SMOOTH_ALPHA);
+        is_opaque && is_bare && (self.specular_weight.is_zero() || self.alpha.iter().any(rough)) && self.is_present()
     }
 
     /// Whether some light passes through the surface somewhere.
