@@ -36,6 +36,9 @@ const ROULETTE_FROM: u32 = 4;
 const ENDING_FROM: u32 = 64;
 const MOST_LIKELY: f32 = 0.97;
 
+/// Smooth events that light is looked for by way of at most: in cut stones chains are long, and bring little.
+const MOST_SMOOTH: u32 = 8;
+
 /// Photons take each of the two ways on from smooth glass with at least this probability: they learn of faint light, too.
 const EXPLORED: f32 = 0.1;
 
@@ -169,6 +172,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         // By way of smooth surfaces the guide finds it, if anything does.
         let pdf = match (self.setting.guide, vertex.look) {
             _ if is_direct => lighting.pdf(&vertex.receiver, direction, met),
+            _ if state.smooth_events > MOST_SMOOTH => 0.0,
             (Some(guide), Some(Look { region, probability })) => {
                 probability * guide.pdf(region, vertex.receiver.point, vertex.direction)
             }
@@ -294,6 +298,9 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                     self.add_focused(walk, &surface, state, u_look, numbers);
                 }
             }
+        }
+        if state.purpose != Purpose::Picture && state.smooth_events == MOST_SMOOTH {
+            return false;
         }
         let [mut u_lobe, u, v, u_roulette] = numbers.draw();
         let explores = state.purpose == Purpose::Photon && u_roulette < 2.0 * EXPLORED;
