@@ -32,7 +32,7 @@ const MARGIN: f64 = 0.25;
 /// The least probability of looking: even faint light is found often enough not to come as a rare spark.
 const LEAST: f32 = 0.1;
 
-/// The probability where the irradiance is the median of the focused light; more takes time from all else.
+/// The worth of a look where the irradiance is the median of the focused light; more takes time from all else.
 const LOOKS: f32 = 2.0;
 
 /// From a larger solid angle chance is as good, sr.
@@ -98,8 +98,8 @@ struct Region {
     /// Flux, and that over the region's area.
     flux: f32,
     irradiance: f32,
-    /// Probability with which a path of full weight looks for light from here.
-    probability: f32,
+    /// Of a look from here.
+    worth: f32,
     lobes: Vec<Lobe>,
 }
 
@@ -168,13 +168,13 @@ impl Guide {
         });
         let Some(&(median, _)) = median else { return };
         for region in &mut self.regions {
-            region.probability = (LOOKS * (region.irradiance / median).sqrt()).clamp(LEAST, 1.0);
+            region.worth = (LOOKS * (region.irradiance / median).sqrt()).max(LEAST);
         }
     }
 
-    /// Probability with which a path of full weight looks for light from the region.
-    pub(super) fn probability(&self, id: RegionId) -> f32 {
-        self.regions[id.0 as usize].probability
+    /// Probability with which a path that carries `weight` looks for light from the region.
+    pub(super) fn probability(&self, id: RegionId, weight: f32) -> f32 {
+        (weight * self.regions[id.0 as usize].worth).clamp(0.0, 1.0)
     }
 
     /// The region about a point; `None` where no focused light is known of.
@@ -258,7 +258,7 @@ impl Region {
         let DVec3 { x, y, z } = max - min;
         let area = (x * y).max(y * z).max(z * x);
         let irradiance = (f64::from(total) / area).min(f64::from(f32::MAX)) as f32;
-        let region = Self { center, half_extent, flux: total, irradiance, probability: 1.0, lobes };
+        let region = Self { center, half_extent, flux: total, irradiance, worth: 1.0, lobes };
         // 1 over the mean density of its own directions.
         let mean: f32 =
             (photons.iter().zip(&directions)).map(|(p, d)| p.flux / total * region.pdf(Vec3::ZERO, *d)).sum();
@@ -348,7 +348,7 @@ mod tests {
         let guide = Guide::new(vec![same; 500]).unwrap();
         let id = guide.region(DVec3::ONE).unwrap();
         let (direction, pdf) = guide.sample(id, DVec3::ONE, [0.5; 2], [0.5; 2]).unwrap();
-        assert!(direction.is_finite() && pdf.is_finite() && (0.0..=1.0).contains(&guide.probability(id)));
+        assert!(direction.is_finite() && pdf.is_finite() && (0.0..=1.0).contains(&guide.probability(id, 1.0)));
     }
 
     #[test]
