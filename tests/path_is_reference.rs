@@ -332,6 +332,36 @@ fn path_is_reference_for_light_that_is_not_natural() {
     }
 }
 
+/// What glass gathers on the wall behind it may be found by ways of its own: they must know what lamps are told.
+#[test]
+fn path_is_reference_for_focused_light() {
+    let lamp = || Light { intensity: 4.0, ..light("/World/Lamp", sphere(1.2), at(2.0, 4.0, 3.5)) };
+    let shadow = LightShadow { enable: false, color: [0.0; 3], distance: -1.0, falloff: -1.0, falloff_gamma: 1.0 };
+    let lamps = [
+        ("plain", lamp()),
+        ("factors", Light { diffuse: 0.3, specular: 2.0, ..lamp() }),
+        ("light link", Light { light_link: Some(0), ..lamp() }),
+        ("shadow link", Light { shadow_link: Some(0), ..lamp() }),
+        ("no shadows", Light { shadow: Some(shadow), ..lamp() }),
+        ("rectangle", {
+            let down = at(0.0, 4.0, 2.0) * DMat4::from_rotation_x(-PI / 2.0);
+            Light {
+                intensity: 4.0,
+                ..light("/World/Lamp", LightShape::Rect { width: 2.0, height: 2.5, texture: None }, down)
+            }
+        }),
+    ];
+    let effort = Effort { samples: [2048, 32768], error: 0.015 };
+    for (name, lamp) in lamps {
+        let dome = Light { intensity: 0.05, ..light("/World/Dome", dome(), DMat4::IDENTITY) };
+        let mut s = still_life(|s| s.glass("/World/Glass", SF11), vec![lamp, dome]);
+        s.document.link_sets = vec![LinkSet { path: "/World/Lamp.collection:link".into(), excludes: true }];
+        let ball = s.document.groups[0].items.iter_mut().find(|item| item.path == "/World/Ball").unwrap();
+        ball.link_sets = vec![0];
+        assert_agree(&format!("focused, {name}"), &s.build(), effort);
+    }
+}
+
 #[test]
 fn path_is_reference_for_light_with_a_picture_on_it() {
     let pixel = |x: u32, y: u32| if (x / 2 + y / 3).is_multiple_of(2) { [255, 200, 40] } else { [10, 30, 120] };

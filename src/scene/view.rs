@@ -89,13 +89,15 @@ impl<'a> View<'a> {
 
     /// Objects whose surfaces may be smooth glass or mirrors, with their boxes at all times in render space.
     pub fn focusing(&self) -> impl Iterator<Item = (u32, [DVec3; 2])> {
-        let is_smooth = |id: &u32| {
-            let material = id.checked_sub(1).map(|i| &self.scene.materials[i as usize]);
-            material.is_some_and(|m| matches!(m.kind, Kind::Dielectric { rough: false, .. } | Kind::Mirror { .. }))
-        };
-        let has_smooth = move |object: &u32| self.scene.objects.ids(*object).material_ids.iter().any(is_smooth);
+        let smooth: Vec<bool> = (self.scene.materials.iter())
+            .map(|m| matches!(m.kind, Kind::Dielectric { rough: false, .. } | Kind::Mirror { .. }))
+            .collect();
+        // Many scenes have none: their objects are not asked.
+        let count = if smooth.contains(&true) { self.scene.objects.len() } else { 0 };
+        let is_smooth = move |id: &u32| id.checked_sub(1).is_some_and(|i| smooth[i as usize]);
+        let has_smooth = move |object: &u32| self.scene.objects.ids(*object).material_ids.iter().any(&is_smooth);
         let bounded = |object| Some((object, self.aggregate.bounds_of_instance(object)?));
-        (0..self.scene.objects.len()).filter(has_smooth).filter_map(bounded)
+        (0..count).filter(has_smooth).filter_map(bounded)
     }
 
     /// Whether the surface at `hit` can coincide with another object's glass (cemented lenses, liquid in its glass).

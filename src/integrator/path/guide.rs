@@ -32,7 +32,7 @@ const MARGIN: f64 = 0.25;
 /// The least probability of looking: even faint light is found often enough not to come as a rare spark.
 const LEAST: f32 = 0.1;
 
-/// The probability where the irradiance is the median of the focused light; more takes time from all else.
+/// The worth of a look where the irradiance is the median of the focused light; more takes time from all else.
 const LOOKS: f32 = 2.0;
 
 /// From a larger solid angle chance is as good, sr.
@@ -106,8 +106,8 @@ struct Region {
     /// Flux, and that over the region's area.
     flux: f32,
     irradiance: f32,
-    /// Probability with which a path of full weight looks for light from here.
-    probability: f32,
+    /// Of a look from here.
+    worth: f32,
     lobes: Vec<Lobe>,
     /// The same by four.
     densities: Vec<Lobes>,
@@ -178,13 +178,13 @@ impl Guide {
         });
         let Some(&(median, _)) = median else { return };
         for region in &mut self.regions {
-            region.probability = (LOOKS * (region.irradiance / median).sqrt()).clamp(LEAST, 1.0);
+            region.worth = (LOOKS * (region.irradiance / median).sqrt()).max(LEAST);
         }
     }
 
-    /// Probability with which a path of full weight looks for light from the region.
-    pub(super) fn probability(&self, id: RegionId) -> f32 {
-        self.regions[id.0 as usize].probability
+    /// Probability with which a path that carries `weight` looks for light from the region.
+    pub(super) fn probability(&self, id: RegionId, weight: f32) -> f32 {
+        (weight * self.regions[id.0 as usize].worth).clamp(0.0, 1.0)
     }
 
     /// The region about a point; `None` where no focused light is known of.
@@ -268,8 +268,8 @@ impl Region {
         // Surfaces are flat: the area is that of the two largest extents.
         let DVec3 { x, y, z } = max - min;
         let area = (x * y).max(y * z).max(z * x);
-        let irradiance = (f64::from(total) / area.max(f64::MIN_POSITIVE)) as f32;
-        let region = Self { center, half_extent, flux: total, irradiance, probability: 1.0, lobes, densities };
+        let irradiance = (f64::from(total) / area).min(f64::from(f32::MAX)) as f32;
+        let region = Self { center, half_extent, flux: total, irradiance, worth: 1.0, lobes, densities };
         // 1 over the mean density of its own directions.
         let mean: f32 =
             (photons.iter().zip(&directions)).map(|(p, d)| p.flux / total * region.pdf(Vec3::ZERO, *d)).sum();
@@ -278,5 +278,98 @@ impl Region {
 
     fn pdf(&self, at: Vec3, direction: Vec3) -> f32 {
         self.densities.iter().map(|lobes| lobes.pdf(at, direction)).sum::<Vec4>().element_sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn uniform(i: u32, salt: u32) -> f32 {
+        let mut z = u64::from(i) << 32 | u64::from(salt);
+        z = (z ^ (z >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        z = (z ^ (z >> 33)).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
+        ((z ^ (z >> 33)) >> 40) as f32 / 16_777_216.0
+    }
+
+    /// Photons on a floor of 2 × 2 that left a lens of radius 0.3 above it, brighter on one side.
+    fn photons(count: u32) -> Vec<Photon> {
+        let around = |i: u32, salt: u32| f64::from(uniform(i, salt)) * 2.0 - 1.0;
+        (0..count)
+            .map(|i| Photon {
+                point: DVec3::new(around(i, 1), 0.0, around(i, 2)),
+                from: DVec3::new(0.3 * around(i, 3), 1.0, 0.3 * around(i, 4)),
+                flux: 0.1 + uniform(i, 5),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn directions_are_drawn_with_their_density() {
+        let guide = Guide::new(photons(2000)).unwrap();
+        let point = DVec3::new(0.4, 0.0, -0.3);
+        let id = guide.region(point).unwrap();
+        // Of a smooth function: its mean over what is drawn, and ∫ of it times the density, with ∫ of the density itself.
+        let f = |d: DVec3| (3.0 * d.x).sin() + d.z * d.y;
+        let count = 400_000;
+        let (mut drawn, mut integral, mut whole) = (0.0, 0.0, 0.0);
+        for i in 0..count {
+            let u = |salt| uniform(i, salt);
+            let (direction, pdf) = guide.sample(id, point, [u(1), u(2)], [u(3), u(4)]).unwrap();
+            assert!((f64::from(pdf / guide.pdf(id, point, direction)) - 1.0).abs() < 1e-6);
+            drawn += f(direction) / f64::from(count);
+            // Even directions of the upper hemisphere, where all caps are.
+            let (y, phi) = (f64::from(u(5)), f64::from(TAU * u(6)));
+            let r = (1.0 - y * y).sqrt();
+            let direction = DVec3::new(r * phi.cos(), y, r * phi.sin());
+            let weight = f64::from(guide.pdf(id, point, direction)) * f64::from(TAU) / f64::from(count);
+            whole += weight;
+            integral += weight * f(direction);
+        }
+        assert!((whole - 1.0).abs() < 0.01, "{whole}");
+        assert!((drawn - integral).abs() < 0.01, "{drawn} {integral}");
+    }
+
+    #[test]
+    fn directions_lead_to_where_the_photons_came_from() {
+        let guide = Guide::new(photons(2000)).unwrap();
+        for point in [DVec3::new(0.9, 0.0, 0.9), DVec3::new(-0.5, 0.0, 0.1), DVec3::ZERO] {
+            let id = guide.region(point).unwrap();
+            let lens = (0..1000).filter(|&i| {
+                let u = |salt| uniform(i, salt);
+                let (direction, _) = guide.sample(id, point, [u(1), u(2)], [u(3), u(4)]).unwrap();
+                let at = point + direction * ((1.0 - point.y) / direction.y);
+                at.x.abs() < 0.35 && at.z.abs() < 0.35
+            });
+            let share = lens.count();
+            assert!(share > 650, "{share} of 1000");
+        }
+    }
+
+    #[test]
+    fn nothing_is_looked_for_where_no_photon_came() {
+        let guide = Guide::new(photons(2000)).unwrap();
+        assert!(guide.region(DVec3::new(0.0, 3.0, 0.0)).is_none());
+        assert!(guide.region(DVec3::new(9.0, 0.0, 0.0)).is_none());
+        assert!(Guide::new(Vec::new()).is_none() && Guide::new(photons(5)).is_none());
+        let broken = Photon { point: DVec3::NAN, from: DVec3::ZERO, flux: f32::NAN };
+        assert!(Guide::new(vec![broken; 500]).is_none());
+        // All in one point: a region without extent.
+        let same = Photon { point: DVec3::ONE, from: DVec3::Y * 3.0, flux: 1.0 };
+        let guide = Guide::new(vec![same; 500]).unwrap();
+        let id = guide.region(DVec3::ONE).unwrap();
+        let (direction, pdf) = guide.sample(id, DVec3::ONE, [0.5; 2], [0.5; 2]).unwrap();
+        assert!(direction.is_finite() && pdf.is_finite() && (0.0..=1.0).contains(&guide.probability(id, 1.0)));
+    }
+
+    #[test]
+    fn light_from_everywhere_is_left_to_chance() {
+        let from_everywhere = |i: u32| {
+            let (y, phi) = (f64::from(uniform(i, 1)), f64::from(TAU * uniform(i, 2)));
+            let r = (1.0 - y * y).sqrt();
+            let point = DVec3::new(f64::from(uniform(i, 3)), 0.0, f64::from(uniform(i, 4)));
+            Photon { point, from: point + DVec3::new(r * phi.cos(), y, r * phi.sin()), flux: 1.0 }
+        };
+        assert!(Guide::new((0..1000).map(from_everywhere).collect()).is_none());
     }
 }

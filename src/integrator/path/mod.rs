@@ -69,8 +69,9 @@ struct Prepared<'a> {
     follower: Follower<'a>,
     lighting: Lighting<'a>,
     laws: Laws<'a>,
-    /// Without any dispersion, if the clean beauty is asked for.
+    /// Without any dispersion, if the clean beauty is asked for; it looks where a render without dispersion does.
     clean: Option<Laws<'a>>,
+    clean_guide: Option<Guide>,
     plate: Option<Plate>,
     /// Where to look for light that is focused; `None` if none is.
     guide: Option<Guide>,
@@ -115,23 +116,26 @@ impl<'a> Prepared<'a> {
             clean: if clean_layers.is_empty() { None } else { Some(Laws::new(scene, 0.0)?) },
             plate,
             guide: None,
+            clean_guide: None,
             expressions,
             parts,
             clean_layers,
             others: if has_others { Some(Differentials::prepared(task)?) } else { None },
         };
-        prepared.guide = photons::guide(prepared.setting(), task, &prepared.laws, &prepared.visible);
+        let learn = |laws| photons::guide(prepared.setting(None), task, laws, &prepared.visible);
+        let (guide, clean_guide) = (learn(&prepared.laws), prepared.clean.as_ref().and_then(learn));
+        (prepared.guide, prepared.clean_guide) = (guide, clean_guide);
         Ok(prepared)
     }
 
-    fn setting(&self) -> Setting<'_> {
+    fn setting<'s>(&'s self, guide: Option<&'s Guide>) -> Setting<'s> {
         Setting {
             view: self.task.view,
             camera: self.task.camera,
             follower: &self.follower,
             lighting: &self.lighting,
             plate: self.plate.as_ref(),
-            guide: self.guide.as_ref(),
+            guide,
             limits: self.task.depth_limits,
         }
     }
@@ -180,8 +184,11 @@ impl<'a, const N: usize, const DISPERSIVE: bool> PathWorker<'a, N, DISPERSIVE> {
     fn new(prepared: &'a Prepared<'a>) -> Self {
         Self {
             prepared,
-            tracer: Tracer::new(prepared.setting(), &prepared.laws, &prepared.expressions),
-            clean: prepared.clean.as_ref().map(|laws| Tracer::new(prepared.setting(), laws, &[])),
+            tracer: Tracer::new(prepared.setting(prepared.guide.as_ref()), &prepared.laws, &prepared.expressions),
+            clean: prepared
+                .clean
+                .as_ref()
+                .map(|laws| Tracer::new(prepared.setting(prepared.clean_guide.as_ref()), laws, &[])),
             others: prepared.others.as_ref().map(|others| others.sample_worker()),
             color_from_xyz: prepared.task.color_space.from_xyz(),
         }

@@ -16,10 +16,13 @@ use crate::lighting::Receiver;
 use crate::spectrum::visible::Visible;
 use crate::spectrum::{LANES, sensor};
 
-/// Photons sent for a pixel, and the fewest and the most for an image.
-const PER_PIXEL: u64 = 6;
+/// Photons take about as long as samples: one is sent for so many, but no more than this for a pixel.
+const SAMPLES: u32 = 8;
+const PER_PIXEL: u32 = 8;
+
+/// The fewest and the most for an image.
 const FEWEST: u64 = 1 << 12;
-const MOST: u64 = 1 << 17;
+const MOST: u64 = 1 << 20;
 
 /// Photons sent by one task.
 const CHUNK: u32 = 512;
@@ -45,7 +48,8 @@ pub(super) fn guide(setting: Setting<'_>, task: &Task<'_>, laws: &Laws<'_>, visi
         return None;
     }
     let pixels = u64::from(task.resolution[0]) * u64::from(task.resolution[1]);
-    let count = (PER_PIXEL * pixels).clamp(FEWEST, MOST) as u32;
+    let per_pixel = task.sampler.samples().div_ceil(SAMPLES).min(PER_PIXEL);
+    let count = (u64::from(per_pixel) * pixels).clamp(FEWEST, MOST) as u32;
     let photons = if laws.is_dispersive() {
         send::<true>(setting, task, laws, visible, &targets, count)
     } else {

@@ -299,8 +299,8 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                     }
                     surface.look = guide.and_then(|guide| {
                         let region = guide.region(met.point)?;
-                        let weight = state.carried::<DISPERSIVE>().mean().clamp(0.0, 1.0);
-                        Some(Look { region, probability: guide.probability(region) * weight })
+                        let weight = state.carried::<DISPERSIVE>().mean();
+                        Some(Look { region, probability: guide.probability(region, weight) })
                     });
                     self.add_focused(walk, &surface, state, u_look, numbers);
                 }
