@@ -33,7 +33,7 @@ pub struct Knot {
 }
 
 /// Cells of the guide to the segments, per knot.
-const GUIDE: usize = 16;
+const GUIDE: usize = 4;
 
 impl PiecewiseLinear {
     /// Proportional to the linear interpolation of `table`: points (x, value ≥ 0) with x increasing, at least two, not all 0.
