@@ -29,11 +29,15 @@ const WIDEST: f32 = 1.0;
 /// Regions reach beyond their photons by this part of their largest extent.
 const MARGIN: f64 = 0.25;
 
-/// The least probability of looking: even faint light is found often enough not to come as a rare spark.
+/// Probability of a look over the share that focused light has of all: the best for looks that cost a third of a path and leave twice the
+/// square of what they find as variance, beside a tenth of the square of all light from everything else.
+const LOOKS: f32 = 8.0;
+
+/// The least: what is found must not come as a rare spark.
 const LEAST: f32 = 0.1;
 
-/// The worth of a look where the irradiance is the median of the focused light; more takes time from all else.
-const LOOKS: f32 = 2.0;
+/// The variance that chance leaves, over the square of all light, which is not worth a look.
+const NEGLIGIBLE: f32 = 1e-4;
 
 /// From a larger solid angle chance is as good, sr.
 const LARGE: f32 = 2.5;
@@ -45,7 +49,7 @@ pub(super) struct Photon {
     pub(super) point: DVec3,
     /// Where it left the last smooth surface.
     pub(super) from: DVec3,
-    /// In any unit.
+    /// Luminance times area and solid angle.
     pub(super) flux: f32,
 }
 
@@ -103,11 +107,8 @@ impl Lobes {
 struct Region {
     center: DVec3,
     half_extent: DVec3,
-    /// Flux, and that over the region's area.
-    flux: f32,
-    irradiance: f32,
-    /// Of a look from here.
-    worth: f32,
+    /// Probability of a look from here by a path of full weight.
+    probability: f32,
     lobes: Vec<Lobe>,
     /// The same by four.
     densities: Vec<Lobes>,
@@ -134,20 +135,19 @@ pub(super) struct Guide {
 }
 
 impl Guide {
-    /// Learned from photons; `None` if there is nothing to learn.
-    pub(super) fn new(mut photons: Vec<Photon>) -> Option<Self> {
+    /// Learned from photons; `None` if there is nothing to learn. `others` says what other light falls on a surface at a point.
+    pub(super) fn new(mut photons: Vec<Photon>, others: impl Fn(DVec3) -> f32) -> Option<Self> {
         photons.retain(|photon| photon.flux > 0.0 && photon.flux.is_finite() && photon.point.is_finite());
         let mut guide = Self { nodes: Vec::new(), regions: Vec::new() };
-        guide.divide(&mut photons);
-        guide.weigh();
+        guide.divide(&mut photons, &others);
         (!guide.regions.is_empty()).then_some(guide)
     }
 
-    fn divide(&mut self, photons: &mut [Photon]) {
+    fn divide(&mut self, photons: &mut [Photon], others: &impl Fn(DVec3) -> f32) {
         let (min, max) = bounds(photons);
         let extent = max - min;
         if photons.len() < 2 * REGION || extent.max_element() <= 0.0 {
-            let region = Region::new(photons).map(|region| {
+            let region = Region::new(photons, others).map(|region| {
                 self.regions.push(region);
                 RegionId(self.regions.len() as u32 - 1)
             });
@@ -161,30 +161,14 @@ impl Guide {
         let node = self.nodes.len();
         self.nodes.push(Node::Split { axis: axis as u8, at, above: 0 });
         let (below, rest) = photons.split_at_mut(count);
-        self.divide(below);
+        self.divide(below, others);
         self.nodes[node] = Node::Split { axis: axis as u8, at, above: self.nodes.len() as u32 };
-        self.divide(rest);
-    }
-
-    /// Looks are shared out by the square root of what is there, as strata by their deviation: most of the light has all of them.
-    fn weigh(&mut self) {
-        let mut sorted: Vec<(f32, f32)> = self.regions.iter().map(|region| (region.irradiance, region.flux)).collect();
-        sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        let half = 0.5 * sorted.iter().map(|(_, flux)| flux).sum::<f32>();
-        let mut sum = 0.0;
-        let median = sorted.iter().find(|(_, flux)| {
-            sum += flux;
-            sum >= half
-        });
-        let Some(&(median, _)) = median else { return };
-        for region in &mut self.regions {
-            region.worth = (LOOKS * (region.irradiance / median).sqrt()).max(LEAST);
-        }
+        self.divide(rest, others);
     }
 
     /// Probability with which a path that carries `weight` looks for light from the region.
     pub(super) fn probability(&self, id: RegionId, weight: f32) -> f32 {
-        (weight * self.regions[id.0 as usize].worth).clamp(0.0, 1.0)
+        (weight * self.regions[id.0 as usize].probability).clamp(0.0, 1.0)
     }
 
     /// The region about a point; `None` where no focused light is known of.
@@ -240,8 +224,8 @@ fn bounds(photons: &[Photon]) -> (DVec3, DVec3) {
 }
 
 impl Region {
-    /// `None` where light comes from so many directions that chance finds it.
-    fn new(photons: &[Photon]) -> Option<Self> {
+    /// `None` where light comes from so many directions, or is so little, that chance does.
+    fn new(photons: &[Photon], others: impl Fn(DVec3) -> f32) -> Option<Self> {
         if photons.len() <= NEIGHBORS[1] {
             return None;
         }
@@ -268,12 +252,19 @@ impl Region {
         // Surfaces are flat: the area is that of the two largest extents.
         let DVec3 { x, y, z } = max - min;
         let area = (x * y).max(y * z).max(z * x);
-        let irradiance = (f64::from(total) / area).min(f64::from(f32::MAX)) as f32;
-        let region = Self { center, half_extent, flux: total, irradiance, worth: 1.0, lobes, densities };
+        let mut region = Self { center, half_extent, probability: 1.0, lobes, densities };
         // 1 over the mean density of its own directions.
         let mean: f32 =
             (photons.iter().zip(&directions)).map(|(p, d)| p.flux / total * region.pdf(Vec3::ZERO, *d)).sum();
-        (1.0 / mean < LARGE).then_some(region)
+        let solid_angle = 1.0 / mean;
+        let irradiance = (f64::from(total) / area).min(f64::from(f32::MAX)) as f32;
+        let share = 1.0 / (1.0 + others(center) / irradiance);
+        // Light L from a solid angle ω is met by chance with a second moment of L² ω, and is L ω.
+        if solid_angle > LARGE || share * share < NEGLIGIBLE * solid_angle {
+            return None;
+        }
+        region.probability = (LOOKS * share).max(LEAST);
+        Some(region)
     }
 
     fn pdf(&self, at: Vec3, direction: Vec3) -> f32 {
@@ -306,7 +297,7 @@ mod tests {
 
     #[test]
     fn directions_are_drawn_with_their_density() {
-        let guide = Guide::new(photons(2000)).unwrap();
+        let guide = Guide::new(photons(2000), |_| 0.0).unwrap();
         let point = DVec3::new(0.4, 0.0, -0.3);
         let id = guide.region(point).unwrap();
         // Of a smooth function: its mean over what is drawn, and ∫ of it times the density, with ∫ of the density itself.
@@ -332,7 +323,7 @@ mod tests {
 
     #[test]
     fn directions_lead_to_where_the_photons_came_from() {
-        let guide = Guide::new(photons(2000)).unwrap();
+        let guide = Guide::new(photons(2000), |_| 0.0).unwrap();
         for point in [DVec3::new(0.9, 0.0, 0.9), DVec3::new(-0.5, 0.0, 0.1), DVec3::ZERO] {
             let id = guide.region(point).unwrap();
             let lens = (0..1000).filter(|&i| {
@@ -348,15 +339,15 @@ mod tests {
 
     #[test]
     fn nothing_is_looked_for_where_no_photon_came() {
-        let guide = Guide::new(photons(2000)).unwrap();
+        let guide = Guide::new(photons(2000), |_| 0.0).unwrap();
         assert!(guide.region(DVec3::new(0.0, 3.0, 0.0)).is_none());
         assert!(guide.region(DVec3::new(9.0, 0.0, 0.0)).is_none());
-        assert!(Guide::new(Vec::new()).is_none() && Guide::new(photons(5)).is_none());
+        assert!(Guide::new(Vec::new(), |_| 0.0).is_none() && Guide::new(photons(5), |_| 0.0).is_none());
         let broken = Photon { point: DVec3::NAN, from: DVec3::ZERO, flux: f32::NAN };
-        assert!(Guide::new(vec![broken; 500]).is_none());
+        assert!(Guide::new(vec![broken; 500], |_| 0.0).is_none());
         // All in one point: a region without extent.
         let same = Photon { point: DVec3::ONE, from: DVec3::Y * 3.0, flux: 1.0 };
-        let guide = Guide::new(vec![same; 500]).unwrap();
+        let guide = Guide::new(vec![same; 500], |_| 0.0).unwrap();
         let id = guide.region(DVec3::ONE).unwrap();
         let (direction, pdf) = guide.sample(id, DVec3::ONE, [0.5; 2], [0.5; 2]).unwrap();
         assert!(direction.is_finite() && pdf.is_finite() && (0.0..=1.0).contains(&guide.probability(id, 1.0)));
@@ -370,6 +361,19 @@ mod tests {
             let point = DVec3::new(f64::from(uniform(i, 3)), 0.0, f64::from(uniform(i, 4)));
             Photon { point, from: point + DVec3::new(r * phi.cos(), y, r * phi.sin()), flux: 1.0 }
         };
-        assert!(Guide::new((0..1000).map(from_everywhere).collect()).is_none());
+        assert!(Guide::new((0..1000).map(from_everywhere).collect(), |_| 0.0).is_none());
+    }
+
+    #[test]
+    fn faint_light_is_looked_for_seldom_or_never() {
+        let probability = |others: f32| {
+            let guide = Guide::new(photons(2000), |_| others)?;
+            let id = guide.region(DVec3::ZERO)?;
+            Some(guide.probability(id, 1.0))
+        };
+        // 2000 photons of 0.6 on 4: an irradiance of 300 from a tenth of a steradian or two.
+        assert_eq!(probability(0.0), Some(1.0));
+        assert!(probability(1e4).is_some_and(|p| (0.15..0.35).contains(&p)));
+        assert_eq!(probability(1e6), None);
     }
 }

@@ -24,6 +24,9 @@ const PER_PIXEL: u32 = 8;
 const FEWEST: u64 = 1 << 12;
 const MOST: u64 = 1 << 20;
 
+/// Lights that are asked what else falls on a region.
+const LIGHTS: u32 = 16;
+
 /// Photons sent by one task.
 const CHUNK: u32 = 512;
 
@@ -55,7 +58,19 @@ pub(super) fn guide(setting: Setting<'_>, task: &Task<'_>, laws: &Laws<'_>, visi
     } else {
         send::<false>(setting, task, laws, visible, &targets, count)
     };
-    Guide::new(photons)
+    // As if nothing were in the way, and from all sides alike: half of it is behind.
+    let others = |point| {
+        let receiver = Receiver { point, normal: None, object: targets[0].object, time: 0.0 };
+        let one = |index| {
+            let mut numbers = task.sampler.independent(PIXEL, index);
+            let wavelengths = visible.sample::<LANES>(numbers.wavelength());
+            let [u_light, u, v, _] = numbers.draw();
+            let light = setting.lighting.sample(&receiver, &wavelengths, u_light, [u, v])?;
+            Some(sensor::xyz(light.radiance, &wavelengths).y as f32 / light.pdf)
+        };
+        0.5 * (0..LIGHTS).filter_map(one).sum::<f32>() / LIGHTS as f32
+    };
+    Guide::new(photons, others)
 }
 
 fn send<const DISPERSIVE: bool>(
@@ -76,7 +91,11 @@ fn send<const DISPERSIVE: bool>(
             indices.filter_map(|index| one(&mut tracer, task, visible, targets, reach, index)).collect()
         })
         .collect();
-    chunks.concat()
+    let mut photons = chunks.concat();
+    // A photon of the chosen object stands for those of the others.
+    let share = targets.len() as f32 / count as f32;
+    photons.iter_mut().for_each(|photon| photon.flux *= share);
+    photons
 }
 
 fn one<const DISPERSIVE: bool>(
