@@ -362,6 +362,48 @@ fn path_is_reference_for_focused_light() {
     }
 }
 
+/// Light by way of a pane and of the varnish behind it: surfaces with a smooth lobe beside others end what is looked for.
+#[test]
+fn path_is_reference_for_varnish_behind_glass() {
+    let lamp = Light { intensity: 30.0, ..light("/World/Lamp", sphere(0.8), at(2.0, 0.0, 0.0)) };
+    let mut s = Stagehand::new();
+    let grey = lambert(&mut s, 0.5);
+    let varnish = open_pbr(&mut s, &[("specular_roughness", number(0.0)), ("specular_ior", number(4.0))]);
+    let pane = open_pbr(
+        &mut s,
+        &[
+            ("transmission_weight", number(1.0)),
+            ("specular_roughness", number(0.0)),
+            ("geometry_thin_walled", authored("bool", json!(true))),
+        ],
+    );
+    s.wall(-3.0, 8.0, Some(grey));
+    let toward_x = DMat4::from_rotation_y(PI / 2.0) * DMat4::from_scale(DVec3::new(8.0, 8.0, 1.0));
+    s.unit_square("/World/Varnish", at(-2.0, 0.0, 0.0) * toward_x, varnish);
+    s.unit_square("/World/Pane", at(-1.9, 0.0, 0.0) * toward_x, pane);
+    // Between the lamp and the wall.
+    s.unit_square("/World/Card", at(3.5, 0.0, -1.0) * DMat4::from_scale(DVec3::new(6.0, 8.0, 1.0)), grey);
+    s.camera(DVec3::new(-0.5, 0.0, 2.0), DVec3::new(-0.5, 0.0, -3.0));
+    s.document.groups[0].lights = vec![lamp];
+    assert_agree("varnish behind a pane", &s.build(), Effort { samples: [4096, 32768], error: 0.02 });
+}
+
+/// Where a surface bounds no other medium than there was, rays go straight on, and shadow rays do not.
+#[test]
+fn path_is_reference_for_water_in_water() {
+    let lamp = Light { intensity: 4.0, ..light("/World/Lamp", sphere(1.2), at(2.0, 4.0, 3.5)) };
+    let mut water = 0;
+    let mut s = still_life(
+        |s| {
+            water = s.constant_glass("/World/Water", 1.33);
+            water
+        },
+        vec![lamp],
+    );
+    s.sphere("/World/Sea", 30.0, DMat4::IDENTITY, Some(water));
+    assert_agree("water in water", &s.build(), Effort { samples: [2048, 32768], error: 0.02 });
+}
+
 #[test]
 fn path_is_reference_for_light_with_a_picture_on_it() {
     let pixel = |x: u32, y: u32| if (x / 2 + y / 3).is_multiple_of(2) { [255, 200, 40] } else { [10, 30, 120] };

@@ -190,11 +190,6 @@ impl Sampler {
         Ok(Self { samples, seed, over_time: false, filter: None })
     }
 
-    /// Samples a pixel, of the whole image.
-    pub fn samples(&self) -> u32 {
-        self.samples
-    }
-
     /// The same sampler, with samples spread over time, or all in the middle of it. Nothing else of a sample changes.
     pub fn over_time(self, over_time: bool) -> Self {
         Self { over_time, ..self }

@@ -11,8 +11,10 @@
 //! never light.
 
 use std::f32::consts::TAU;
+use std::ops::Range;
 
 use glam::{DVec3, Vec3, Vec4};
+use rayon::prelude::*;
 
 /// Photons of a region.
 const REGION: usize = 32;
@@ -35,9 +37,6 @@ const LOOKS: f32 = 8.0;
 
 /// The least: what is found must not come as a rare spark.
 const LEAST: f32 = 0.1;
-
-/// The variance that chance leaves, over the square of all light, which is not worth a look.
-const NEGLIGIBLE: f32 = 1e-4;
 
 /// From a larger solid angle chance is as good, sr.
 const LARGE: f32 = 2.5;
@@ -122,53 +121,43 @@ pub(super) struct RegionId(u32);
 #[derive(Clone, Copy, Debug)]
 enum Node {
     /// Below `at` on the axis the next node, else the node `above`.
-    Split { axis: u8, at: f64, above: u32 },
-    /// A region, if it is worth looking.
-    Leaf(Option<RegionId>),
+    Split {
+        axis: u8,
+        at: f64,
+        above: u32,
+    },
+    Leaf(RegionId),
 }
 
 /// Directions of focused light.
 #[derive(Debug)]
 pub(super) struct Guide {
     nodes: Vec<Node>,
-    regions: Vec<Region>,
+    /// `None` where looking is not worth it.
+    regions: Vec<Option<Region>>,
 }
 
 impl Guide {
-    /// Learned from photons; `None` if there is nothing to learn. `others` says what other light falls on a surface at a point.
-    pub(super) fn new(mut photons: Vec<Photon>, others: impl Fn(DVec3) -> f32) -> Option<Self> {
+    /// Learned from photons; `None` if there is nothing to learn. `others` says what other light falls on the middle of a
+    /// region with a number.
+    pub(super) fn new(mut photons: Vec<Photon>, others: impl Fn(u32, DVec3) -> f32 + Sync) -> Option<Self> {
         photons.retain(|photon| photon.flux > 0.0 && photon.flux.is_finite() && photon.point.is_finite());
-        let mut guide = Self { nodes: Vec::new(), regions: Vec::new() };
-        guide.divide(&mut photons, &others);
-        (!guide.regions.is_empty()).then_some(guide)
+        let (mut nodes, mut leaves) = (Vec::new(), Vec::new());
+        divide(&mut photons, 0, &mut nodes, &mut leaves);
+        let region = |(number, leaf): (usize, &Range<usize>)| {
+            Region::new(&photons[leaf.clone()], |center| others(number as u32, center))
+        };
+        let regions: Vec<Option<Region>> = leaves.par_iter().enumerate().map(region).collect();
+        regions.iter().any(Option::is_some).then_some(Self { nodes, regions })
     }
 
-    fn divide(&mut self, photons: &mut [Photon], others: &impl Fn(DVec3) -> f32) {
-        let (min, max) = bounds(photons);
-        let extent = max - min;
-        if photons.len() < 2 * REGION || extent.max_element() <= 0.0 {
-            let region = Region::new(photons, others).map(|region| {
-                self.regions.push(region);
-                RegionId(self.regions.len() as u32 - 1)
-            });
-            self.nodes.push(Node::Leaf(region));
-            return;
-        }
-        let axis = extent.max_position();
-        let middle = photons.len() / 2;
-        let (below, at, _) = photons.select_nth_unstable_by(middle, |a, b| a.point[axis].total_cmp(&b.point[axis]));
-        let (count, at) = (below.len(), at.point[axis]);
-        let node = self.nodes.len();
-        self.nodes.push(Node::Split { axis: axis as u8, at, above: 0 });
-        let (below, rest) = photons.split_at_mut(count);
-        self.divide(below, others);
-        self.nodes[node] = Node::Split { axis: axis as u8, at, above: self.nodes.len() as u32 };
-        self.divide(rest, others);
+    fn get(&self, id: RegionId) -> &Region {
+        self.regions[id.0 as usize].as_ref().expect("only regions have numbers")
     }
 
     /// Probability with which a path that carries `weight` looks for light from the region.
     pub(super) fn probability(&self, id: RegionId, weight: f32) -> f32 {
-        (weight * self.regions[id.0 as usize].probability).clamp(0.0, 1.0)
+        (weight * self.get(id).probability).clamp(0.0, 1.0)
     }
 
     /// The region about a point; `None` where no focused light is known of.
@@ -180,9 +169,9 @@ impl Guide {
                     node = if point[usize::from(axis)] < at { node + 1 } else { above as usize };
                 }
                 Node::Leaf(id) => {
-                    let region = &self.regions[id?.0 as usize];
+                    let region = self.regions[id.0 as usize].as_ref()?;
                     let is_within = (point - region.center).abs().cmple(region.half_extent).all();
-                    return id.filter(|_| is_within);
+                    return is_within.then_some(id);
                 }
             }
         }
@@ -196,7 +185,7 @@ impl Guide {
         [u_lobe, u_cap]: [f32; 2],
         u: [f32; 2],
     ) -> Option<(DVec3, f32)> {
-        let region = &self.regions[id.0 as usize];
+        let region = self.get(id);
         let at = (point - region.center).as_vec3();
         let chosen = region.lobes.partition_point(|lobe| lobe.up_to <= u_lobe).min(region.lobes.len() - 1);
         let lobe = &region.lobes[chosen];
@@ -213,9 +202,32 @@ impl Guide {
 
     /// The density per solid angle with which [`sample`](Self::sample) draws a direction.
     pub(super) fn pdf(&self, id: RegionId, point: DVec3, direction: DVec3) -> f32 {
-        let region = &self.regions[id.0 as usize];
+        let region = self.get(id);
         region.pdf((point - region.center).as_vec3(), direction.as_vec3())
     }
+}
+
+/// Halves the photons again and again, until each part has few; `begin` is the place of the first one among all.
+fn divide(photons: &mut [Photon], begin: usize, nodes: &mut Vec<Node>, leaves: &mut Vec<Range<usize>>) {
+    let (min, max) = bounds(photons);
+    let extent = max - min;
+    let is_point = !(extent.max_element() > 0.0);
+    if photons.len() < 2 * REGION || is_point {
+        nodes.push(Node::Leaf(RegionId(leaves.len() as u32)));
+        // Any of many in one point say the same.
+        leaves.push(begin..begin + photons.len().min(2 * REGION));
+        return;
+    }
+    let axis = extent.max_position();
+    let middle = photons.len() / 2;
+    let (_, at, _) = photons.select_nth_unstable_by(middle, |a, b| a.point[axis].total_cmp(&b.point[axis]));
+    let at = at.point[axis];
+    let node = nodes.len();
+    nodes.push(Node::Split { axis: axis as u8, at, above: 0 });
+    let (below, rest) = photons.split_at_mut(middle);
+    divide(below, begin, nodes, leaves);
+    nodes[node] = Node::Split { axis: axis as u8, at, above: nodes.len() as u32 };
+    divide(rest, begin + middle, nodes, leaves);
 }
 
 fn bounds(photons: &[Photon]) -> (DVec3, DVec3) {
@@ -224,7 +236,7 @@ fn bounds(photons: &[Photon]) -> (DVec3, DVec3) {
 }
 
 impl Region {
-    /// `None` where light comes from so many directions, or is so little, that chance does.
+    /// `None` where light comes from so many directions that chance finds it.
     fn new(photons: &[Photon], others: impl Fn(DVec3) -> f32) -> Option<Self> {
         if photons.len() <= NEIGHBORS[1] {
             return None;
@@ -259,8 +271,7 @@ impl Region {
         let solid_angle = 1.0 / mean;
         let irradiance = (f64::from(total) / area).min(f64::from(f32::MAX)) as f32;
         let share = 1.0 / (1.0 + others(center) / irradiance);
-        // Light L from a solid angle ω is met by chance with a second moment of L² ω, and is L ω.
-        if solid_angle > LARGE || share * share < NEGLIGIBLE * solid_angle {
+        if solid_angle > LARGE {
             return None;
         }
         region.probability = (LOOKS * share).max(LEAST);
@@ -297,7 +308,7 @@ mod tests {
 
     #[test]
     fn directions_are_drawn_with_their_density() {
-        let guide = Guide::new(photons(2000), |_| 0.0).unwrap();
+        let guide = Guide::new(photons(2000), |_, _| 0.0).unwrap();
         let point = DVec3::new(0.4, 0.0, -0.3);
         let id = guide.region(point).unwrap();
         // Of a smooth function: its mean over what is drawn, and ∫ of it times the density, with ∫ of the density itself.
@@ -323,7 +334,7 @@ mod tests {
 
     #[test]
     fn directions_lead_to_where_the_photons_came_from() {
-        let guide = Guide::new(photons(2000), |_| 0.0).unwrap();
+        let guide = Guide::new(photons(2000), |_, _| 0.0).unwrap();
         for point in [DVec3::new(0.9, 0.0, 0.9), DVec3::new(-0.5, 0.0, 0.1), DVec3::ZERO] {
             let id = guide.region(point).unwrap();
             let lens = (0..1000).filter(|&i| {
@@ -339,15 +350,15 @@ mod tests {
 
     #[test]
     fn nothing_is_looked_for_where_no_photon_came() {
-        let guide = Guide::new(photons(2000), |_| 0.0).unwrap();
+        let guide = Guide::new(photons(2000), |_, _| 0.0).unwrap();
         assert!(guide.region(DVec3::new(0.0, 3.0, 0.0)).is_none());
         assert!(guide.region(DVec3::new(9.0, 0.0, 0.0)).is_none());
-        assert!(Guide::new(Vec::new(), |_| 0.0).is_none() && Guide::new(photons(5), |_| 0.0).is_none());
+        assert!(Guide::new(Vec::new(), |_, _| 0.0).is_none() && Guide::new(photons(5), |_, _| 0.0).is_none());
         let broken = Photon { point: DVec3::NAN, from: DVec3::ZERO, flux: f32::NAN };
-        assert!(Guide::new(vec![broken; 500], |_| 0.0).is_none());
+        assert!(Guide::new(vec![broken; 500], |_, _| 0.0).is_none());
         // All in one point: a region without extent.
         let same = Photon { point: DVec3::ONE, from: DVec3::Y * 3.0, flux: 1.0 };
-        let guide = Guide::new(vec![same; 500], |_| 0.0).unwrap();
+        let guide = Guide::new(vec![same; 500], |_, _| 0.0).unwrap();
         let id = guide.region(DVec3::ONE).unwrap();
         let (direction, pdf) = guide.sample(id, DVec3::ONE, [0.5; 2], [0.5; 2]).unwrap();
         assert!(direction.is_finite() && pdf.is_finite() && (0.0..=1.0).contains(&guide.probability(id, 1.0)));
@@ -361,19 +372,19 @@ mod tests {
             let point = DVec3::new(f64::from(uniform(i, 3)), 0.0, f64::from(uniform(i, 4)));
             Photon { point, from: point + DVec3::new(r * phi.cos(), y, r * phi.sin()), flux: 1.0 }
         };
-        assert!(Guide::new((0..1000).map(from_everywhere).collect(), |_| 0.0).is_none());
+        assert!(Guide::new((0..1000).map(from_everywhere).collect(), |_, _| 0.0).is_none());
     }
 
     #[test]
-    fn faint_light_is_looked_for_seldom_or_never() {
+    fn faint_light_is_looked_for_seldom() {
         let probability = |others: f32| {
-            let guide = Guide::new(photons(2000), |_| others)?;
+            let guide = Guide::new(photons(2000), |_, _| others)?;
             let id = guide.region(DVec3::ZERO)?;
             Some(guide.probability(id, 1.0))
         };
         // 2000 photons of 0.6 on 4: an irradiance of 300 from a tenth of a steradian or two.
         assert_eq!(probability(0.0), Some(1.0));
         assert!(probability(1e4).is_some_and(|p| (0.15..0.35).contains(&p)));
-        assert_eq!(probability(1e6), None);
+        assert_eq!(probability(1e9), Some(LEAST));
     }
 }

@@ -16,13 +16,10 @@ use crate::lighting::Receiver;
 use crate::spectrum::visible::Visible;
 use crate::spectrum::{LANES, sensor};
 
-/// Photons take about as long as samples: one is sent for so many, but no more than this for a pixel.
-const SAMPLES: u32 = 8;
-const PER_PIXEL: u32 = 8;
-
-/// The fewest and the most for an image.
+/// Photons for a pixel of the whole image, and the fewest and the most. They take about as long as samples.
+const PER_PIXEL: u64 = 4;
 const FEWEST: u64 = 1 << 12;
-const MOST: u64 = 1 << 20;
+const MOST: u64 = 1 << 18;
 
 /// Lights that are asked what else falls on a region.
 const LIGHTS: u32 = 16;
@@ -51,18 +48,17 @@ pub(super) fn guide(setting: Setting<'_>, task: &Task<'_>, laws: &Laws<'_>, visi
         return None;
     }
     let pixels = u64::from(task.resolution[0]) * u64::from(task.resolution[1]);
-    let per_pixel = task.sampler.samples().div_ceil(SAMPLES).min(PER_PIXEL);
-    let count = (u64::from(per_pixel) * pixels).clamp(FEWEST, MOST) as u32;
+    let count = (PER_PIXEL * pixels).clamp(FEWEST, MOST) as u32;
     let photons = if laws.is_dispersive() {
         send::<true>(setting, task, laws, visible, &targets, count)
     } else {
         send::<false>(setting, task, laws, visible, &targets, count)
     };
     // As if nothing were in the way, and from all sides alike: half of it is behind.
-    let others = |point| {
+    let others = |region: u32, point| {
         let receiver = Receiver { point, normal: None, object: targets[0].object, time: 0.0 };
         let one = |index| {
-            let mut numbers = task.sampler.independent(PIXEL, index);
+            let mut numbers = task.sampler.independent(PIXEL, LIGHTS * region + index);
             let wavelengths = visible.sample::<LANES>(numbers.wavelength());
             let [u_light, u, v, _] = numbers.draw();
             let light = setting.lighting.sample(&receiver, &wavelengths, u_light, [u, v])?;

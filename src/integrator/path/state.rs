@@ -63,6 +63,8 @@ pub(super) struct State<const N: usize> {
     pub(super) vertex: Option<Vertex<N>>,
     /// Smooth events since the vertex, or the start.
     pub(super) smooth_events: u32,
+    /// Whether it has gone on since through what blocks shadow rays.
+    pub(super) is_cut_off: bool,
     /// The object of the last event: only lights that are linked to it count.
     pub(super) object: Option<u32>,
     pub(super) depth: Depth,
@@ -85,6 +87,7 @@ impl<const N: usize> State<N> {
             r: SampledSpectrum::ONE,
             vertex: None,
             smooth_events: 0,
+            is_cut_off: false,
             object: None,
             depth: Depth::default(),
             sees_through: purpose == Purpose::Picture,

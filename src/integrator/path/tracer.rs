@@ -182,6 +182,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             // What blocks it is not what blocks rays: all of it is sampled.
             return;
         }
+        let pdf = if is_direct && state.is_cut_off { 0.0 } else { pdf };
         let weight = if DISPERSIVE {
             1.0 / (state.r + vertex.r_over_pdf * pdf).mean()
         } else {
@@ -235,7 +236,8 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             return true;
         }
         if let Some(far) = far.take_if(|far| far.medium == walk.media.current()) {
-            // The same medium on both sides: no optics.
+            // The same medium on both sides: no optics. But shadow rays know nothing of media.
+            state.is_cut_off = true;
             walk.pass(met, far);
             return true;
         }
@@ -323,6 +325,10 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         if !state.depth.is_within(&limits) {
             return false;
         }
+        // A look ends at a surface with other lobes: nothing but this way leads on from its smooth one.
+        if !surface.bsdf.is_smooth() && !matches!(sample.scattered, Scattered::Toward(_)) {
+            state.vertex = None;
+        }
         let before = state.r;
         state.throughput *= sample.weight;
         let (turned, passes) = match sample.scattered {
@@ -343,7 +349,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                     look: surface.look.filter(|_| !passes),
                     direction: turned,
                 });
-                state.smooth_events = 0;
+                (state.smooth_events, state.is_cut_off) = (0, false);
                 (turned, passes)
             }
             Scattered::Mirror => {
