@@ -17,6 +17,7 @@ mod cuboid;
 mod cut;
 mod departures;
 mod instances;
+mod meeting;
 mod mesh;
 mod motion;
 mod placed;
