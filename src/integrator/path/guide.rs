@@ -211,7 +211,7 @@ impl Guide {
 fn divide(photons: &mut [Photon], begin: usize, nodes: &mut Vec<Node>, leaves: &mut Vec<Range<usize>>) {
     let (min, max) = bounds(photons);
     let extent = max - min;
-    let is_point = !(extent.max_element() > 0.0);
+    let is_point = extent.max_element() <= 0.0;
     if photons.len() < 2 * REGION || is_point {
         nodes.push(Node::Leaf(RegionId(leaves.len() as u32)));
         // Any of many in one point say the same.
