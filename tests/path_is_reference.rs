@@ -365,10 +365,12 @@ fn path_is_reference_for_focused_light() {
 /// Light by way of a pane and of the varnish behind it: surfaces with a smooth lobe beside others end what is looked for.
 #[test]
 fn path_is_reference_for_varnish_behind_glass() {
-    let lamp = Light { intensity: 30.0, ..light("/World/Lamp", sphere(0.8), at(2.0, 0.0, 0.0)) };
     let mut s = Stagehand::new();
-    let grey = lambert(&mut s, 0.5);
-    let varnish = open_pbr(&mut s, &[("specular_roughness", number(0.0)), ("specular_ior", number(4.0))]);
+    let (grey, black) = (lambert(&mut s, 0.6), lambert(&mut s, 0.0));
+    let varnish = open_pbr(
+        &mut s,
+        &[("base_color", color([0.02; 3])), ("specular_roughness", number(0.0)), ("specular_ior", number(4.0))],
+    );
     let pane = open_pbr(
         &mut s,
         &[
@@ -377,15 +379,20 @@ fn path_is_reference_for_varnish_behind_glass() {
             ("geometry_thin_walled", authored("bool", json!(true))),
         ],
     );
-    s.wall(-3.0, 8.0, Some(grey));
-    let toward_x = DMat4::from_rotation_y(PI / 2.0) * DMat4::from_scale(DVec3::new(8.0, 8.0, 1.0));
-    s.unit_square("/World/Varnish", at(-2.0, 0.0, 0.0) * toward_x, varnish);
-    s.unit_square("/World/Pane", at(-1.9, 0.0, 0.0) * toward_x, pane);
-    // Between the lamp and the wall.
-    s.unit_square("/World/Card", at(3.5, 0.0, -1.0) * DMat4::from_scale(DVec3::new(6.0, 8.0, 1.0)), grey);
-    s.camera(DVec3::new(-0.5, 0.0, 2.0), DVec3::new(-0.5, 0.0, -3.0));
-    s.document.groups[0].lights = vec![lamp];
-    assert_agree("varnish behind a pane", &s.build(), Effort { samples: [4096, 32768], error: 0.02 });
+    let mut quad = |path: &str, corners: [[f32; 3]; 4], material| {
+        s.mesh(path, &corners, &[&[0, 1, 2, 3]], DMat4::IDENTITY, Some(material));
+    };
+    quad("/World/Floor", [[-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -3.0], [-5.0, 0.0, -3.0]], grey);
+    let upright = |z: f32| [[-3.0, 0.3, z], [3.0, 0.3, z], [3.0, 5.0, z], [-3.0, 5.0, z]];
+    quad("/World/Varnish", upright(-1.0), varnish);
+    quad("/World/Pane", upright(-0.9), pane);
+    // Between the lamp and the floor.
+    quad("/World/Card", [[-5.0, 1.5, 5.0], [5.0, 1.5, 5.0], [5.0, 1.5, 0.7], [-5.0, 1.5, 0.7]], black);
+    s.camera(DVec3::new(0.0, 6.0, 0.3), DVec3::new(0.0, 0.0, 0.2));
+    s.document.cameras[0].focal_length = 200.0;
+    s.document.groups[0].lights =
+        vec![Light { intensity: 4.0, ..light("/World/Lamp", sphere(1.3), at(0.0, 3.5, 3.0)) }];
+    assert_agree("varnish behind a pane", &s.build(), Effort { samples: [8192, 131_072], error: 0.03 });
 }
 
 /// Where a surface bounds no other medium than there was, rays go straight on, and shadow rays do not.
