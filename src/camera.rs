@@ -259,8 +259,8 @@ impl Camera {
         Ok(self)
     }
 
-    /// What a sample's time is in frames.
-    fn time(&self, sample: &CameraSample) -> f64 {
+    /// When a sample is taken: frames from the scene's own.
+    pub fn time(&self, sample: &CameraSample) -> f64 {
         let [open, close] = self.shutter;
         open + sample.time * (close - open)
     }

@@ -104,7 +104,7 @@ fn one<const DISPERSIVE: bool>(
 ) -> Option<Photon> {
     let mut numbers = task.sampler.path(PIXEL, index);
     let wavelengths = visible.sample::<LANES>(numbers.wavelength());
-    let time = task.camera.ray(&task.sampler.sample(PIXEL, index)).time;
+    let time = task.camera.time(&task.sampler.sample(PIXEL, index));
     let [u_target, x, y, z] = numbers.draw();
     let chosen = (u_target * targets.len() as f32) as usize;
     let &Target { object, min, extent } = targets.get(chosen).or(targets.last())?;

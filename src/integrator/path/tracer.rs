@@ -80,7 +80,8 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         state.alpha
     }
 
-    /// Follows light from `ray` on to where it arrives by way of smooth surfaces alone; `None` if it meets another surface first, or gets lost.
+    /// Follows light from `ray` on to where it arrives by way of smooth surfaces alone; `None` if it meets another surface first, or
+    /// gets lost.
     pub(super) fn photon(
         &mut self,
         ray: Ray,
