@@ -6,6 +6,7 @@ use super::choice::Infinite;
 use super::cone::Cone;
 use super::dome::Dome;
 use super::shape::{Disk, Ellipsoid, Line, Rectangle, Toward, Tube, frame};
+use super::Patch;
 use super::tree::LightBounds;
 use crate::geometry::Bounds;
 use crate::light::{self, Distant, Light, Shape};
@@ -165,6 +166,22 @@ impl Placed {
                 Some(Infinite { emitter, toward: None, irradiance: std::f64::consts::PI * mean * self.brightness })
             }
             _ => None,
+        }
+    }
+
+    /// What covers it as it is seen in the direction `wi`.
+    pub(super) fn patch(&self, wi: DVec3) -> Option<Patch> {
+        let finite = |center: DVec3, half: [DVec3; 2]| Patch { center, half, is_infinite: false };
+        match &self.form {
+            Form::Rectangle { shape, .. } => Some(finite(shape.center(), shape.half())),
+            Form::Disk(disk) => Some(finite(disk.center(), disk.half())),
+            Form::Ellipsoid(ball) => Some(finite(ball.center(), ball.shadow(wi))),
+            Form::Distant(sky) => Some(Patch {
+                center: sky.toward,
+                half: frame(sky.toward).map(|axis| axis * libm::sin(sky.half_angle)),
+                is_infinite: true,
+            }),
+            Form::Tube(_) | Form::Point(_) | Form::Line(_) | Form::Dome(_) => None,
         }
     }
 

@@ -20,7 +20,7 @@ mod shape;
 mod tests;
 mod tree;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use self::choice::{Candidates, Choice, Chooser, Place};
 use self::color::{Color, Filters};
@@ -85,6 +85,34 @@ pub struct LightSample<const N: usize> {
     pub pdf: f32,
     /// Nothing else than sampling it finds it: parallel light, points, lines, geometry whose material is what rays see.
     pub is_delta: bool,
+}
+
+/// A part of a plane, or of the sky.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patch {
+    /// A point, or of the sky a unit vector towards it.
+    pub center: DVec3,
+    /// From there to the sides.
+    pub half: [DVec3; 2],
+    /// Infinitely far.
+    pub is_infinite: bool,
+}
+
+impl Patch {
+    /// Where a ray from `point` in direction `wi` meets its plane: −1..1 on it; `None` if nowhere.
+    pub fn coordinates(&self, point: DVec3, wi: DVec3) -> Option<DVec2> {
+        let [u, v] = self.half;
+        let n = u.cross(v);
+        let q = if self.is_infinite {
+            wi - self.center
+        } else {
+            let to = self.center - point;
+            wi * (to.dot(n) / wi.dot(n)) - to
+        };
+        let square = n.length_squared();
+        let place = DVec2::new(q.dot(v.cross(n)), q.dot(n.cross(u))) / square;
+        place.is_finite().then_some(place)
+    }
 }
 
 /// A light that a ray met.
@@ -223,6 +251,11 @@ impl<'a> Lighting<'a> {
     /// What a light is; `None` for the emission of a material.
     pub fn light(&self, id: LightId) -> Option<&Light> {
         self.lights.get(id.0 as usize)
+    }
+
+    /// A parallelogram that covers a light as it is seen in the direction `wi`; `None` of domes, objects and what has no size.
+    pub fn patch(&self, id: LightId, wi: DVec3) -> Option<Patch> {
+        self.placed.get(id.0 as usize)?.as_ref()?.patch(wi)
     }
 
     /// Names of the light groups.

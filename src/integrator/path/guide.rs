@@ -13,6 +13,7 @@
 use std::f32::consts::TAU;
 use std::ops::Range;
 
+use super::image::{Image, ImageLobe, ImageLobes};
 use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -52,6 +53,8 @@ pub(super) struct Photon {
     pub(super) from: DVec3,
     /// Luminance times area and solid angle.
     pub(super) flux: f32,
+    /// What it has seen of the light.
+    pub(super) image: Option<Image>,
 }
 
 /// Directions towards a point, and around.
@@ -61,6 +64,8 @@ struct Lobe {
     toward: Vec3,
     /// 1 − cos of the half-angles of a narrow cap and a wide one.
     heights: [f32; 2],
+    /// In the place of the narrow cap.
+    image: Option<ImageLobe>,
     share: f32,
     /// Shares up to this one with it, 0..=1.
     up_to: f32,
@@ -83,7 +88,11 @@ impl Lobes {
             (sin2, lanes(&|lobe| part * lobe.share / (TAU * lobe.heights[cap])))
         };
         let toward = [0, 1, 2].map(|axis| lanes(&|lobe| lobe.toward[axis]));
-        Self { toward, caps: [cap(0, 1.0 - WIDE), cap(1, WIDE)] }
+        let wide = knob("G_WIDE", WIDE);
+        let mut caps = [cap(0, 1.0 - wide), cap(1, wide)];
+        let has_cap = lanes(&|lobe| if lobe.image.is_some() { 0.0 } else { 1.0 });
+        caps[0].1 *= has_cap;
+        Self { toward, caps }
     }
 
     /// The densities of a direction from `at`.
@@ -113,6 +122,7 @@ struct Region {
     lobes: Vec<Lobe>,
     /// The same by four.
     densities: Vec<Lobes>,
+    images: Vec<ImageLobes>,
 }
 
 /// Which region.
@@ -191,8 +201,14 @@ impl Guide {
         let at = (point - region.center).as_vec3();
         let chosen = region.lobes.partition_point(|lobe| lobe.up_to <= u_lobe).min(region.lobes.len() - 1);
         let lobe = &region.lobes[chosen];
+        let is_wide = u_cap < knob("G_WIDE", WIDE);
+        if let Some(image) = lobe.image.filter(|_| !is_wide) {
+            let direction = image.direction(at, u).as_dvec3().normalize();
+            let pdf = region.pdf(at, direction.as_vec3());
+            return (pdf > 0.0 && pdf.is_finite()).then_some((direction, pdf));
+        }
         let axis = (lobe.toward - at).try_normalize()?;
-        let height = lobe.heights[usize::from(u_cap < WIDE)] * u[0];
+        let height = lobe.heights[usize::from(is_wide)] * u[0];
         let (sin, cos) = ((height * (2.0 - height)).sqrt(), 1.0 - height);
         let (x, y) = axis.any_orthonormal_pair();
         let (sin_phi, cos_phi) = libm::sincosf(TAU * u[1]);
@@ -259,14 +275,18 @@ impl Region {
             let heights = [narrow, wide].map(|height| height.clamp(NARROWEST, WIDEST));
             let share = photons[i].flux / total;
             up_to += share;
-            Lobe { toward: towards[i], heights, share, up_to }
+            let image = photons[i].image.filter(|image| (image.size() as f32) < knob("G_MAX", 1.0) * knob("G_REL", 1e9).min(1e9f32.max(1.0)) ).map(|image| image.lobe(photons[i].point - center));
+            Lobe { toward: towards[i], heights, image, share, up_to }
         };
         let lobes: Vec<Lobe> = (0..photons.len()).map(lobe).collect();
         let densities = lobes.chunks(4).map(Lobes::new).collect();
         // Surfaces are flat: the area is that of the two largest extents.
         let DVec3 { x, y, z } = max - min;
         let area = (x * y).max(y * z).max(z * x);
-        let mut region = Self { center, half_extent, probability: 1.0, lobes, densities };
+        let with: Vec<(ImageLobe, f32)> =
+            lobes.iter().filter_map(|l: &Lobe| Some((l.image?, (1.0 - knob("G_WIDE", WIDE)) * l.share))).collect();
+        let images = with.chunks(4).map(ImageLobes::new).collect();
+        let mut region = Self { images, center, half_extent, probability: 1.0, lobes, densities };
         // 1 over the mean density of its own directions.
         let mean: f32 =
             (photons.iter().zip(&directions)).map(|(p, d)| p.flux / total * region.pdf(Vec3::ZERO, *d)).sum();
@@ -281,8 +301,19 @@ impl Region {
     }
 
     fn pdf(&self, at: Vec3, direction: Vec3) -> f32 {
-        self.densities.iter().map(|lobes| lobes.pdf(at, direction)).sum::<Vec4>().element_sum()
+        let caps = self.densities.iter().map(|lobes| lobes.pdf(at, direction)).sum::<Vec4>();
+        (caps + self.images.iter().map(|lobes| lobes.pdf(at, direction)).sum::<Vec4>()).element_sum()
     }
+}
+
+pub(super) fn knob(name: &'static str, default: f32) -> f32 {
+    use std::collections::HashMap;
+    use std::sync::{LazyLock, RwLock};
+    static ALL: LazyLock<RwLock<HashMap<&'static str, f32>>> = LazyLock::new(RwLock::default);
+    if let Some(&v) = ALL.read().unwrap().get(name) { return v; }
+    let v = std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default);
+    ALL.write().unwrap().insert(name, v);
+    v
 }
 
 #[cfg(test)]
@@ -304,6 +335,7 @@ mod tests {
                 point: DVec3::new(around(i, 1), 0.0, around(i, 2)),
                 from: DVec3::new(0.3 * around(i, 3), 1.0, 0.3 * around(i, 4)),
                 flux: 0.1 + uniform(i, 5),
+                image: None,
             })
             .collect()
     }
@@ -357,10 +389,10 @@ mod tests {
         assert!(guide.region(DVec3::new(0.0, 3.0, 0.0)).is_none());
         assert!(guide.region(DVec3::new(9.0, 0.0, 0.0)).is_none());
         assert!(Guide::new(Vec::new(), |_, _| 0.0).is_none() && Guide::new(photons(5), |_, _| 0.0).is_none());
-        let broken = Photon { point: DVec3::NAN, from: DVec3::ZERO, flux: f32::NAN };
+        let broken = Photon { point: DVec3::NAN, from: DVec3::ZERO, flux: f32::NAN, image: None };
         assert!(Guide::new(vec![broken; 500], |_, _| 0.0).is_none());
         // All in one point: a region without extent.
-        let same = Photon { point: DVec3::ONE, from: DVec3::Y * 3.0, flux: 1.0 };
+        let same = Photon { point: DVec3::ONE, from: DVec3::Y * 3.0, flux: 1.0, image: None };
         let guide = Guide::new(vec![same; 500], |_, _| 0.0).unwrap();
         let id = guide.region(DVec3::ONE).unwrap();
         let (direction, pdf) = guide.sample(id, DVec3::ONE, [0.5; 2], [0.5; 2]).unwrap();
@@ -373,7 +405,7 @@ mod tests {
             let (y, phi) = (f64::from(uniform(i, 1)), f64::from(TAU * uniform(i, 2)));
             let r = (1.0 - y * y).sqrt();
             let point = DVec3::new(f64::from(uniform(i, 3)), 0.0, f64::from(uniform(i, 4)));
-            Photon { point, from: point + DVec3::new(r * phi.cos(), y, r * phi.sin()), flux: 1.0 }
+            Photon { point, from: point + DVec3::new(r * phi.cos(), y, r * phi.sin()), flux: 1.0, image: None }
         };
         assert!(Guide::new((0..1000).map(from_everywhere).collect(), |_, _| 0.0).is_none());
     }

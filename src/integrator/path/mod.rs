@@ -9,6 +9,7 @@ mod depth;
 mod direct;
 mod guide;
 mod guided;
+mod image;
 mod ledger;
 mod photons;
 mod plate;

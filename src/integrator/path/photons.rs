@@ -8,6 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::guide::{Guide, Photon};
+use super::image::Trail;
 use super::tracer::{Setting, Tracer};
 use crate::geometry::Ray;
 use crate::integrator::Task;
@@ -125,7 +126,10 @@ fn one<const DISPERSIVE: bool>(
     let way = far.min_element() - near.max_element();
     let volume = extent.max(DVec3::splat(1e-3 * extent.max_element())).element_product();
     let area = volume / way.max(1e-3 * extent.max_element());
-    let arrival = tracer.photon(ray, wavelengths, &mut numbers)?;
+    let patch = tracer.setting.lighting.patch(light.light, light.wi);
+    let trail = patch.and_then(|patch| Trail::new(patch, &ray));
+    let arrival = tracer.photon(ray, trail, wavelengths, &mut numbers)?;
     let [_, luminance, _] = sensor::xyz(light.radiance * arrival.carried, &wavelengths).to_array();
-    Some(Photon { point: arrival.point, from: arrival.from, flux: (luminance * area) as f32 / light.pdf })
+    let flux = (luminance * area) as f32 / light.pdf;
+    Some(Photon { point: arrival.point, from: arrival.from, flux, image: arrival.image })
 }

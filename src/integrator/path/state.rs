@@ -4,11 +4,14 @@ use glam::{DVec3, Vec3};
 
 use super::depth::Depth;
 use super::guide::RegionId;
+use super::image::{Image, Trail};
 use crate::bsdf::Bsdf;
+use crate::geometry::Ray;
 use crate::integrator::frame::Frame;
 use crate::integrator::walk::SurfacePoint;
 use crate::lighting::Receiver;
 use crate::optics::media::MediumId;
+use crate::ray::Scattering;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
 
 /// What a path is followed for.
@@ -52,6 +55,8 @@ pub(super) struct Arrival<const N: usize> {
     pub(super) from: DVec3,
     /// What is left of its light.
     pub(super) carried: SampledSpectrum<N>,
+    /// What it has seen of the light.
+    pub(super) image: Option<Image>,
 }
 
 /// What a path has come to.
@@ -75,6 +80,8 @@ pub(super) struct State<const N: usize> {
     pub(super) squeezed: f32,
     /// Where a photon has arrived.
     pub(super) arrival: Option<Arrival<N>>,
+    /// How a photon's way changes with its beginning.
+    pub(super) trail: Option<Trail>,
 }
 
 impl<const N: usize> State<N> {
@@ -94,6 +101,7 @@ impl<const N: usize> State<N> {
             alpha: 0.0,
             squeezed: 1.0,
             arrival: None,
+            trail: None,
         }
     }
 
@@ -119,8 +127,9 @@ impl<const N: usize> State<N> {
     }
 
     /// A photon that comes from `from` has arrived, if it came by way of a smooth surface.
-    pub(super) fn arrive<const DISPERSIVE: bool>(&mut self, point: DVec3, from: DVec3) {
-        let arrival = Arrival { point, from, carried: self.carried::<DISPERSIVE>() };
+    pub(super) fn arrive<const DISPERSIVE: bool>(&mut self, point: DVec3, from: &Ray, ior: f64) {
+        let image = self.trail.and_then(|trail| trail.image(from.direction, ior));
+        let arrival = Arrival { point, from: from.origin, carried: self.carried::<DISPERSIVE>(), image };
         self.arrival = (self.smooth_events > 0).then_some(arrival);
     }
 
@@ -129,6 +138,13 @@ impl<const N: usize> State<N> {
         self.smooth_events += 1;
         if self.vertex.as_ref().is_some_and(|vertex| vertex.look.is_none()) {
             self.vertex = None;
+        }
+    }
+
+    /// The ray is refracted or reflected.
+    pub(super) fn turn(&mut self, scattering: &Scattering) {
+        if let Some(trail) = &mut self.trail {
+            trail.scatter(scattering);
         }
     }
 

@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::depth::DepthLimits;
 use super::guide::Guide;
+use super::image::Trail;
 use super::ledger::Ledger;
 use super::plate::Plate;
 use super::state::{Arrival, Look, Purpose, Scatterer, State, Vertex};
@@ -85,12 +86,13 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     pub(super) fn photon(
         &mut self,
         ray: Ray,
+        trail: Option<Trail>,
         wavelengths: Wavelengths<N>,
         numbers: &mut PathSampler,
     ) -> Option<Arrival<N>> {
         self.media.restart(wavelengths);
         let mut walk = Walk::anywhere(self.setting.view, ray);
-        let mut state = State::new(Purpose::Photon, wavelengths);
+        let mut state = State { trail, ..State::new(Purpose::Photon, wavelengths) };
         self.follow(&mut walk, &mut state, numbers);
         state.arrival
     }
@@ -126,6 +128,9 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             if walk.crossings > MAX_CROSSINGS {
                 self.counters.exhausted += 1;
                 break;
+            }
+            if let Some(trail) = &mut state.trail {
+                trail.transfer(&walk.ray, met, medium.ior);
             }
             if !self.event(walk, met, state, numbers) {
                 break;
@@ -292,7 +297,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             match state.purpose {
                 Purpose::Focused => return false,
                 Purpose::Photon => {
-                    state.arrive::<DISPERSIVE>(met.point, walk.ray.origin);
+                    state.arrive::<DISPERSIVE>(met.point, &walk.ray, medium.ior);
                     return false;
                 }
                 Purpose::Picture => {
@@ -357,12 +362,14 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 state.pass_smoothly();
                 let ior = medium.jet();
                 let scattering = mirror(ior.ior * direction, &met.surface, &ior);
+                state.turn(&scattering);
                 ((scattering.momentum_out / ior.ior).normalize(), false)
             }
             Scattered::Refract => {
                 state.pass_smoothly();
                 let (ior_i, ior_t) = (medium.jet(), far_medium.jet());
                 let scattering = refract_or_reflect(ior_i.ior * direction, &met.surface, &ior_i, &ior_t);
+                state.turn(&scattering);
                 if DISPERSIVE && (medium.is_dispersive || far_medium.is_dispersive) {
                     state.leave_companions();
                 }
@@ -404,7 +411,8 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             self.meet(state, walk.ray.direction, &emitted);
         }
         if state.purpose == Purpose::Photon && !lighting.replaces_material(&met.hit) {
-            state.arrive::<DISPERSIVE>(met.point, walk.ray.origin);
+            let ior = self.media.of(walk.media.current()).ior;
+            state.arrive::<DISPERSIVE>(met.point, &walk.ray, ior);
         }
     }
 

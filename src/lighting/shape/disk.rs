@@ -36,6 +36,15 @@ impl Disk {
         Self { center, half: [a, b], normal, area, around: Rectangle::new(center, a, b, normal, false) }
     }
 
+    pub(in crate::lighting) fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Half axes, perpendicular to each other.
+    pub(in crate::lighting) fn half(&self) -> [DVec3; 2] {
+        self.half
+    }
+
     pub(in crate::lighting) fn corners(&self) -> [DVec3; 4] {
         self.around.corners()
     }

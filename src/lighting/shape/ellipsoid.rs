@@ -56,6 +56,17 @@ impl Ellipsoid {
         DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length())
     }
 
+    /// Half sides of a parallelogram about the centre, across `d`, in which it is seen by an observer far off in that direction: with the axes A and
+    /// two vectors E across, its outline is the ellipse L u, |u| = 1, of L Lᵀ = E A Aᵀ Eᵀ.
+    pub(in crate::lighting) fn shadow(&self, d: DVec3) -> [DVec3; 2] {
+        let [x, y] = frame(d);
+        let rows = self.directions.render_from_local.transpose();
+        let (a, b) = (rows * x, rows * y);
+        let length = a.length();
+        let along = a.dot(b) / length;
+        [length * x + along * y, (b.length_squared() - along * along).max(0.0).sqrt() * y]
+    }
+
     pub(in crate::lighting) fn center(&self) -> DVec3 {
         self.center
     }

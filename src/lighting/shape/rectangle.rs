@@ -77,6 +77,15 @@ impl Rectangle {
         }
     }
 
+    pub(in crate::lighting) fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// From the middle to the sides.
+    pub(in crate::lighting) fn half(&self) -> [DVec3; 2] {
+        self.half
+    }
+
     pub(in crate::lighting) fn area(&self) -> f64 {
         self.area
     }

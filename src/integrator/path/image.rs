@@ -1,0 +1,210 @@
+//! The image of a light that a chain of smooth events shows: where on the light a direction from a point leads, to first order.
+//!
+//! Along a fixed chain the place on the light is a smooth function of the point x from which one looks and of the direction; through
+//! flat facets it is nearly affine. A photon takes with it the columns of its ray's Jacobian by its place on the light and by its
+//! direction there (`ray/`); where it arrives their inverse is that function's derivative. So one photon knows the whole image of the light, and how
+//! it moves and turns as seen from all about: the linearised specular manifold of W. Jakob, S. Marschner, "Manifold exploration", TOG 31(4), 2012, as a
+//! lobe of a guide.
+
+use glam::{DMat4, DVec2, DVec3, DVec4, Vec3, Vec4};
+
+use crate::geometry::Ray;
+use crate::integrator::walk::SurfacePoint;
+use crate::lighting::Patch;
+use crate::optics::IorJet;
+use crate::ray::{ColumnSet, Curvature, RayStart, Scattering, ScreenColumns, Transfer};
+
+/// The columns of a photon on its way: by its place on the light, and by its direction there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Trail {
+    by_place: ScreenColumns,
+    by_direction: ScreenColumns,
+    patch: Patch,
+    /// Of the photon on the patch.
+    place: DVec2,
+}
+
+/// The image that a photon has seen, where it arrived.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Image {
+    /// Towards where the photon came from, a unit vector, and two across.
+    pub(super) axes: [DVec3; 3],
+    /// On the light, −1..1 where it shines.
+    place: DVec2,
+    /// By how much that changes for a point across, and for the tangent of a direction across.
+    by_point: [DVec2; 2],
+    by_direction: [DVec2; 2],
+}
+
+impl Trail {
+    /// Of a photon that begins with `ray` on a light's patch.
+    pub(super) fn new(patch: Patch, ray: &Ray) -> Option<Self> {
+        let place = patch.coordinates(ray.origin, -ray.direction)?;
+        let Ray { origin: point, direction, time } = *ray;
+        let frame = direction.any_orthonormal_pair();
+        let start = |[point_x, point_y]: [DVec3; 2], [direction_x, direction_y]: [DVec3; 2]| {
+            let zero = DVec3::ZERO;
+            let start = RayStart {
+                point,
+                direction,
+                point_x,
+                point_y,
+                direction_x,
+                direction_y,
+                direction_xx: zero,
+                direction_xy: zero,
+                direction_yy: zero,
+                time,
+            };
+            ScreenColumns::start(&start, &IorJet::constant(1.0))
+        };
+        let (nowhere, across) = ([DVec3::ZERO; 2], [frame.0, frame.1]);
+        let (by_place, by_direction) = if patch.is_infinite {
+            (start(nowhere, patch.half.map(|half| -half)), start(across, nowhere))
+        } else {
+            (start(patch.half, nowhere), start(nowhere, across))
+        };
+        Some(Self { by_place, by_direction, patch, place })
+    }
+
+    /// Goes on to a surface.
+    pub(super) fn transfer(&mut self, ray: &Ray, met: &SurfacePoint, ior: f64) {
+        self.transfer_to(met.hit.distance, ray.direction, met.surface.n_g, met.surface.curvature, ior);
+    }
+
+    fn transfer_to(&mut self, distance: f64, direction: DVec3, n_g: DVec3, curvature: Curvature, ior: f64) {
+        let transfer = Transfer { distance, direction, medium: IorJet::constant(ior), n_g, curvature };
+        self.by_place.transfer(&transfer);
+        self.by_direction.transfer(&transfer);
+    }
+
+    /// Refracted or reflected.
+    pub(super) fn scatter(&mut self, scattering: &Scattering) {
+        self.by_place.scatter(scattering);
+        self.by_direction.scatter(scattering);
+    }
+
+    /// What it has seen, arriving in a direction; `None` if all of it is one point or none.
+    pub(super) fn image(mut self, direction: DVec3, ior: f64) -> Option<Image> {
+        let (x, y) = direction.any_orthonormal_pair();
+        self.transfer_to(0.0, direction, direction, Curvature::Plane, ior);
+        let columns = [self.by_place.screen()?, self.by_direction.screen()?].concat();
+        let column = |i: usize| {
+            let c = columns[i];
+            let (point, turn) = (c.point, c.momentum / ior);
+            DVec4::new(x.dot(point), y.dot(point), x.dot(turn), y.dot(turn))
+        };
+        let arrival = DMat4::from_cols(column(0), column(1), column(2), column(3));
+        let inverse = arrival.inverse();
+        let rows = |i: usize| DVec2::new(inverse.col(i).x, inverse.col(i).y);
+        let image = Image {
+            axes: [-direction, x, y],
+            place: self.place,
+            by_point: [rows(0), rows(1)],
+            // A direction back is the opposite.
+            by_direction: [-rows(2), -rows(3)],
+        };
+        let is_finite = [rows(0), rows(1), rows(2), rows(3)].iter().all(|v| v.is_finite());
+        (is_finite && image.determinant().abs() > 0.0).then_some(image)
+    }
+}
+
+impl Image {
+    fn determinant(&self) -> f64 {
+        let [a, b] = self.by_direction;
+        a.perp_dot(b)
+    }
+
+    /// Its size on the plane of tangents.
+    pub(super) fn size(&self) -> f64 {
+        4.0 / self.determinant().abs()
+    }
+
+    /// As a lobe of a region about `center`, for a photon that arrived at `point`.
+    pub(super) fn lobe(&self, point: DVec3) -> ImageLobe {
+        let [z, x, y] = self.axes;
+        let p = point;
+        let along = |[a, b]: [DVec2; 2], k: usize| (x * a[k] + y * b[k]).as_vec3();
+        let by_point = [0, 1].map(|k| along(self.by_point, k));
+        let at_zero = [0, 1].map(|k| {
+            let row = x * self.by_point[0][k] + y * self.by_point[1][k];
+            (self.place[k] - row.dot(p)) as f32
+        });
+        let by_direction = [0, 1].map(|k| along(self.by_direction, k));
+        let [a, b] = self.by_direction;
+        let d = self.determinant();
+        // Of the inverse of the matrix with the columns a, b.
+        let back = [(x * b.y - y * a.y) / d, (y * a.x - x * b.x) / d].map(|v| v.as_vec3());
+        ImageLobe {
+            axis: z.as_vec3(),
+            at_zero,
+            by_point,
+            by_direction,
+            back,
+            density: (d.abs() / 4.0) as f32,
+        }
+    }
+}
+
+/// An image in a region, relative to its centre.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ImageLobe {
+    axis: Vec3,
+    at_zero: [f32; 2],
+    by_point: [Vec3; 2],
+    by_direction: [Vec3; 2],
+    back: [Vec3; 2],
+    /// On the plane of tangents.
+    density: f32,
+}
+
+impl ImageLobe {
+    /// The direction from `at` to a place of the light, each coordinate 0..1.
+    pub(super) fn direction(&self, at: Vec3, u: [f32; 2]) -> Vec3 {
+        let offset = |k: usize| 2.0 * u[k] - 1.0 - self.at_zero[k] - self.by_point[k].dot(at);
+        self.axis + self.back[0] * offset(0) + self.back[1] * offset(1)
+    }
+}
+
+/// Four of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ImageLobes {
+    axis: [Vec4; 3],
+    at_zero: [Vec4; 2],
+    by_point: [[Vec4; 3]; 2],
+    by_direction: [[Vec4; 3]; 2],
+    density: Vec4,
+}
+
+fn dot([x, y, z]: [Vec4; 3], v: Vec3) -> Vec4 {
+    x * v.x + y * v.y + z * v.z
+}
+
+impl ImageLobes {
+    /// With their shares.
+    pub(super) fn new(lobes: &[(ImageLobe, f32)]) -> Self {
+        let lanes =
+            |of: &dyn Fn(&ImageLobe, f32) -> f32| Vec4::from_array(std::array::from_fn(|i| lobes.get(i).map_or(0.0, |l| of(&l.0, l.1))));
+        let vector = |of: &dyn Fn(&ImageLobe) -> Vec3| [0, 1, 2].map(|axis| lanes(&|l, _| of(l)[axis]));
+        Self {
+            axis: vector(&|l| l.axis),
+            at_zero: [0, 1].map(|k| lanes(&|l, _| l.at_zero[k])),
+            by_point: [0, 1].map(|k| vector(&|l| l.by_point[k])),
+            by_direction: [0, 1].map(|k| vector(&|l| l.by_direction[k])),
+            density: lanes(&|l, share| share * l.density),
+        }
+    }
+
+    /// Density per solid angle of a direction from `at`.
+    #[inline]
+    pub(super) fn pdf(&self, at: Vec3, direction: Vec3) -> Vec4 {
+        let along = dot(self.axis, direction);
+        let inverse = along.recip();
+        let within = |k: usize| {
+            let place = self.at_zero[k] + dot(self.by_point[k], at) + dot(self.by_direction[k], direction) * inverse;
+            place.abs().cmple(Vec4::ONE)
+        };
+        let is_in = within(0) & within(1) & along.cmpgt(Vec4::ZERO);
+        Vec4::select(is_in, self.density * inverse * inverse * inverse, Vec4::ZERO)
+    }
+}
