@@ -158,6 +158,12 @@ impl<const N: usize> Bsdf<N> {
         }
     }
 
+    /// Whether it is one smooth interface that light passes: it is mirrored for `u_lobe` = 0 and passes for 1, if it can, and what has
+    /// another probability than 0 or 1 is that choice alone.
+    pub fn is_clear(&self) -> bool {
+        matches!(self.kind, Kind::Clear(_))
+    }
+
     /// Draws a direction; `None` where the light is absorbed, or `wo` is not above the surface. `u_lobe` chooses the lobe, `u` the
     /// direction.
     pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample<N>> {

@@ -13,6 +13,7 @@
 use std::f32::consts::TAU;
 use std::ops::Range;
 
+use super::state::Way;
 use super::image::{Image, ImageLobe, ImageLobes};
 use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
@@ -55,6 +56,8 @@ pub(super) struct Photon {
     pub(super) flux: f32,
     /// What it has seen of the light.
     pub(super) image: Option<Image>,
+    /// The way back.
+    pub(super) way: Way,
 }
 
 /// Directions towards a point, and around.
@@ -66,6 +69,7 @@ struct Lobe {
     heights: [f32; 2],
     /// In the place of the narrow cap.
     image: Option<ImageLobe>,
+    way: Way,
     share: f32,
     /// Shares up to this one with it, 0..=1.
     up_to: f32,
@@ -77,6 +81,7 @@ struct Lobes {
     toward: [Vec4; 3],
     /// Of the narrow caps and the wide ones: sin² of the half-angle, and the cap's share over its solid angle, 1/sr.
     caps: [(Vec4, Vec4); 2],
+    ways: Vec4,
 }
 
 impl Lobes {
@@ -92,12 +97,12 @@ impl Lobes {
         let mut caps = [cap(0, 1.0 - wide), cap(1, wide)];
         let has_cap = lanes(&|lobe| if lobe.image.is_some() { 0.0 } else { 1.0 });
         caps[0].1 *= has_cap;
-        Self { toward, caps }
+        Self { toward, caps, ways: lanes(&|lobe| lobe.way.code()) }
     }
 
     /// The densities of a direction from `at`.
     #[inline]
-    fn pdf(&self, at: Vec3, direction: Vec3) -> Vec4 {
+    fn pdf(&self, at: Vec3, direction: Vec3, code: Vec4) -> (Vec4, Vec4) {
         let [x, y, z] = self.toward;
         let (x, y, z) = (x - at.x, y - at.y, z - at.z);
         let along = x * direction.x + y * direction.y + z * direction.z;
@@ -108,7 +113,7 @@ impl Lobes {
         let within = |(sin2, density): (Vec4, Vec4)| {
             Vec4::select(across2.cmplt(sin2 * length2) & along.cmpgt(Vec4::ZERO), density, Vec4::ZERO)
         };
-        within(self.caps[0]) + within(self.caps[1])
+        (Vec4::select(self.ways.cmpeq(code), within(self.caps[0]), Vec4::ZERO), within(self.caps[1]))
     }
 }
 
@@ -196,7 +201,7 @@ impl Guide {
         point: DVec3,
         [u_lobe, u_cap]: [f32; 2],
         u: [f32; 2],
-    ) -> Option<(DVec3, f32)> {
+    ) -> Option<(DVec3, Option<Way>)> {
         let region = self.get(id);
         let at = (point - region.center).as_vec3();
         let chosen = region.lobes.partition_point(|lobe| lobe.up_to <= u_lobe).min(region.lobes.len() - 1);
@@ -204,8 +209,7 @@ impl Guide {
         let is_wide = u_cap < knob("G_WIDE", WIDE);
         if let Some(image) = lobe.image.filter(|_| !is_wide) {
             let direction = image.direction(at, u).as_dvec3().normalize();
-            let pdf = region.pdf(at, direction.as_vec3());
-            return (pdf > 0.0 && pdf.is_finite()).then_some((direction, pdf));
+            return Some((direction, Some(lobe.way)));
         }
         let axis = (lobe.toward - at).try_normalize()?;
         let height = lobe.heights[usize::from(is_wide)] * u[0];
@@ -213,15 +217,13 @@ impl Guide {
         let (x, y) = axis.any_orthonormal_pair();
         let (sin_phi, cos_phi) = libm::sincosf(TAU * u[1]);
         let direction = (x * (sin * cos_phi) + y * (sin * sin_phi) + axis * cos).as_dvec3().normalize();
-        // Rounding can put it just beyond the edge of its own cap, where nothing may be left.
-        let pdf = region.pdf(at, direction.as_vec3());
-        (pdf > 0.0).then_some((direction, pdf))
+        Some((direction, (!is_wide).then_some(lobe.way)))
     }
 
     /// The density per solid angle with which [`sample`](Self::sample) draws a direction.
-    pub(super) fn pdf(&self, id: RegionId, point: DVec3, direction: DVec3) -> f32 {
+    pub(super) fn pdf(&self, id: RegionId, point: DVec3, direction: DVec3, way: Way, chosen: f32) -> f32 {
         let region = self.get(id);
-        region.pdf((point - region.center).as_vec3(), direction.as_vec3())
+        region.pdf((point - region.center).as_vec3(), direction.as_vec3(), way, chosen)
     }
 }
 
@@ -275,21 +277,21 @@ impl Region {
             let heights = [narrow, wide].map(|height| height.clamp(NARROWEST, WIDEST));
             let share = photons[i].flux / total;
             up_to += share;
-            let image = photons[i].image.filter(|image| (image.size() as f32) < knob("G_MAX", 1.0) * knob("G_REL", 1e9).min(1e9f32.max(1.0)) ).map(|image| image.lobe(photons[i].point - center));
-            Lobe { toward: towards[i], heights, image, share, up_to }
+            let image = photons[i].image.filter(|image| (image.size() as f32) < knob("G_MAX", 1e9)).map(|image| image.lobe(photons[i].point - center));
+            Lobe { toward: towards[i], heights, image, way: photons[i].way, share, up_to }
         };
         let lobes: Vec<Lobe> = (0..photons.len()).map(lobe).collect();
         let densities = lobes.chunks(4).map(Lobes::new).collect();
         // Surfaces are flat: the area is that of the two largest extents.
         let DVec3 { x, y, z } = max - min;
         let area = (x * y).max(y * z).max(z * x);
-        let with: Vec<(ImageLobe, f32)> =
-            lobes.iter().filter_map(|l: &Lobe| Some((l.image?, (1.0 - knob("G_WIDE", WIDE)) * l.share))).collect();
+        let with: Vec<(ImageLobe, Way, f32)> =
+            lobes.iter().filter_map(|l: &Lobe| Some((l.image?, l.way, (1.0 - knob("G_WIDE", WIDE)) * l.share))).collect();
         let images = with.chunks(4).map(ImageLobes::new).collect();
         let mut region = Self { images, center, half_extent, probability: 1.0, lobes, densities };
         // 1 over the mean density of its own directions.
         let mean: f32 =
-            (photons.iter().zip(&directions)).map(|(p, d)| p.flux / total * region.pdf(Vec3::ZERO, *d)).sum();
+            (photons.iter().zip(&directions)).map(|(p, d)| p.flux / total * region.pdf(Vec3::ZERO, *d, p.way, 1.0)).sum();
         let solid_angle = 1.0 / mean;
         if solid_angle > LARGE {
             return None;
@@ -300,9 +302,18 @@ impl Region {
         Some(region)
     }
 
-    fn pdf(&self, at: Vec3, direction: Vec3) -> f32 {
-        let caps = self.densities.iter().map(|lobes| lobes.pdf(at, direction)).sum::<Vec4>();
-        (caps + self.images.iter().map(|lobes| lobes.pdf(at, direction)).sum::<Vec4>()).element_sum()
+    fn pdf(&self, at: Vec3, direction: Vec3, way: Way, chosen: f32) -> f32 {
+        let code = Vec4::splat(way.code());
+        let (mut own, mut any) = (Vec4::ZERO, Vec4::ZERO);
+        for lobes in &self.densities {
+            let (narrow, wide) = lobes.pdf(at, direction, code);
+            own += narrow;
+            any += wide;
+        }
+        for lobes in &self.images {
+            own += lobes.pdf(at, direction, code);
+        }
+        (own * (1.0 / chosen) + any).element_sum()
     }
 }
 

@@ -3,7 +3,7 @@
 //! From every vertex where the guide knows of such light a path of its own looks for it: it costs a chain, as a sampled light costs a
 //! shadow ray, and is weighed against the BSDF's own directions.
 
-use super::state::{Look, Purpose, Scatterer, State};
+use super::state::{Look, Purpose, Scatterer, State, Vertex};
 use super::tracer::Tracer;
 use crate::bsdf;
 use crate::integrator::light_path::Event;
@@ -21,13 +21,13 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         u_look: f32,
         numbers: &PathSampler,
     ) {
-        let (Some(guide), Some(Look { region, probability })) = (self.setting.guide, surface.look) else { return };
+        let (Some(guide), Some(Look { region, probability, .. })) = (self.setting.guide, surface.look) else { return };
         if u_look >= probability {
             return;
         }
         let mut numbers = numbers.branch();
         let [u_lobe, u, v, u_cap] = numbers.draw();
-        let Some((direction, pdf)) = guide.sample(region, surface.met.point, [u_lobe, u_cap], [u, v]) else { return };
+        let Some((direction, wanted)) = guide.sample(region, surface.met.point, [u_lobe, u_cap], [u, v]) else { return };
         let wi = surface.frame.to_local(direction);
         if wi.z <= 0.0 || direction.dot(surface.n_g) <= 0.0 {
             return;
@@ -41,14 +41,18 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             smooth_events: 0,
             depth: state.depth.after(event),
             squeezed: state.squeezed,
+            wanted,
+            throughput: state.throughput * value,
+            r: state.r * f.pdf,
+            vertex: Some(Vertex {
+                receiver: surface.receiver,
+                r_over_pdf: state.r,
+                diffuse_share: SampledSpectrum::ZERO,
+                look: surface.look,
+                direction,
+            }),
             ..State::new(Purpose::Focused, state.wavelengths)
         };
-        let either = f.pdf + SampledSpectrum::splat(probability * pdf);
-        if DISPERSIVE {
-            (found.throughput, found.r) = (state.throughput * value, state.r * either);
-        } else {
-            found.throughput = state.throughput * value * (1.0 / either.hero());
-        }
         if found.throughput.is_black() {
             return;
         }

@@ -8,6 +8,7 @@
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec3, Vec4};
 
+use super::state::Way;
 use crate::geometry::Ray;
 use crate::integrator::walk::SurfacePoint;
 use crate::lighting::Patch;
@@ -19,7 +20,6 @@ use crate::ray::{ColumnSet, Curvature, RayStart, Scattering, ScreenColumns, Tran
 pub(super) struct Trail {
     by_place: ScreenColumns,
     by_direction: ScreenColumns,
-    patch: Patch,
     /// Of the photon on the patch.
     place: DVec2,
 }
@@ -64,7 +64,7 @@ impl Trail {
         } else {
             (start(patch.half, nowhere), start(nowhere, across))
         };
-        Some(Self { by_place, by_direction, patch, place })
+        Some(Self { by_place, by_direction, place })
     }
 
     /// Goes on to a surface.
@@ -173,6 +173,7 @@ pub(super) struct ImageLobes {
     at_zero: [Vec4; 2],
     by_point: [[Vec4; 3]; 2],
     by_direction: [[Vec4; 3]; 2],
+    ways: Vec4,
     density: Vec4,
 }
 
@@ -182,29 +183,30 @@ fn dot([x, y, z]: [Vec4; 3], v: Vec3) -> Vec4 {
 
 impl ImageLobes {
     /// With their shares.
-    pub(super) fn new(lobes: &[(ImageLobe, f32)]) -> Self {
+    pub(super) fn new(lobes: &[(ImageLobe, Way, f32)]) -> Self {
         let lanes =
-            |of: &dyn Fn(&ImageLobe, f32) -> f32| Vec4::from_array(std::array::from_fn(|i| lobes.get(i).map_or(0.0, |l| of(&l.0, l.1))));
+            |of: &dyn Fn(&ImageLobe, f32) -> f32| Vec4::from_array(std::array::from_fn(|i| lobes.get(i).map_or(0.0, |l| of(&l.0, l.2))));
         let vector = |of: &dyn Fn(&ImageLobe) -> Vec3| [0, 1, 2].map(|axis| lanes(&|l, _| of(l)[axis]));
         Self {
             axis: vector(&|l| l.axis),
             at_zero: [0, 1].map(|k| lanes(&|l, _| l.at_zero[k])),
             by_point: [0, 1].map(|k| vector(&|l| l.by_point[k])),
             by_direction: [0, 1].map(|k| vector(&|l| l.by_direction[k])),
+            ways: Vec4::from_array(std::array::from_fn(|i| lobes.get(i).map_or(0.0, |l| l.1.code()))),
             density: lanes(&|l, share| share * l.density),
         }
     }
 
     /// Density per solid angle of a direction from `at`.
     #[inline]
-    pub(super) fn pdf(&self, at: Vec3, direction: Vec3) -> Vec4 {
+    pub(super) fn pdf(&self, at: Vec3, direction: Vec3, code: Vec4) -> Vec4 {
         let along = dot(self.axis, direction);
         let inverse = along.recip();
         let within = |k: usize| {
             let place = self.at_zero[k] + dot(self.by_point[k], at) + dot(self.by_direction[k], direction) * inverse;
             place.abs().cmple(Vec4::ONE)
         };
-        let is_in = within(0) & within(1) & along.cmpgt(Vec4::ZERO);
+        let is_in = self.ways.cmpeq(code) & within(0) & within(1) & along.cmpgt(Vec4::ZERO);
         Vec4::select(is_in, self.density * inverse * inverse * inverse, Vec4::ZERO)
     }
 }

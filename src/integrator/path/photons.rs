@@ -131,5 +131,5 @@ fn one<const DISPERSIVE: bool>(
     let arrival = tracer.photon(ray, trail, wavelengths, &mut numbers)?;
     let [_, luminance, _] = sensor::xyz(light.radiance * arrival.carried, &wavelengths).to_array();
     let flux = (luminance * area) as f32 / light.pdf;
-    Some(Photon { point: arrival.point, from: arrival.from, flux, image: arrival.image })
+    Some(Photon { point: arrival.point, from: arrival.from, flux, image: arrival.image, way: arrival.way })
 }

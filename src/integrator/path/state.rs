@@ -25,6 +25,40 @@ pub(super) enum Purpose {
     Photon,
 }
 
+/// Which way a path takes from one smooth event to the next: a bit for each, the first one highest, 1 if it passes; above them a 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Way(u16);
+
+impl Way {
+    /// Before any event.
+    pub(super) const START: Self = Self(1);
+
+    fn events(self) -> u32 {
+        15 - self.0.leading_zeros()
+    }
+
+    /// After another event.
+    pub(super) fn then(self, passes: bool) -> Self {
+        Self(self.0 << 1 | u16::from(passes))
+    }
+
+    /// What happens after a number of events; `None` at the end.
+    pub(super) fn at(self, event: u32) -> Option<bool> {
+        let left = self.events().checked_sub(event + 1)?;
+        Some(self.0 >> left & 1 == 1)
+    }
+
+    /// The other way round.
+    pub(super) fn reversed(self) -> Self {
+        (0..self.events()).rev().filter_map(|event| self.at(event)).fold(Self::START, Self::then)
+    }
+
+    /// As a number.
+    pub(super) fn code(self) -> f32 {
+        f32::from(self.0)
+    }
+}
+
 /// Light by way of smooth surfaces is looked for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Look {
@@ -57,6 +91,8 @@ pub(super) struct Arrival<const N: usize> {
     pub(super) carried: SampledSpectrum<N>,
     /// What it has seen of the light.
     pub(super) image: Option<Image>,
+    /// The way back.
+    pub(super) way: Way,
 }
 
 /// What a path has come to.
@@ -68,6 +104,12 @@ pub(super) struct State<const N: usize> {
     pub(super) vertex: Option<Vertex<N>>,
     /// Smooth events since the vertex, or the start.
     pub(super) smooth_events: u32,
+    /// What they were.
+    pub(super) way: Way,
+    /// Probability of the choices among them that a look makes by itself.
+    pub(super) chosen: f32,
+    /// The only way that a look takes.
+    pub(super) wanted: Option<Way>,
     /// Whether it has gone on since through what blocks shadow rays.
     pub(super) is_cut_off: bool,
     /// The object of the last event: only lights that are linked to it count.
@@ -94,6 +136,9 @@ impl<const N: usize> State<N> {
             r: SampledSpectrum::ONE,
             vertex: None,
             smooth_events: 0,
+            way: Way::START,
+            chosen: 1.0,
+            wanted: None,
             is_cut_off: false,
             object: None,
             depth: Depth::default(),
@@ -109,7 +154,7 @@ impl<const N: usize> State<N> {
     pub(super) fn meets_lights(&self) -> bool {
         match self.purpose {
             Purpose::Picture => true,
-            Purpose::Focused => self.smooth_events > 0,
+            Purpose::Focused => self.smooth_events > 0 && self.wanted.is_none_or(|way| way == self.way),
             Purpose::Photon => false,
         }
     }
@@ -129,13 +174,14 @@ impl<const N: usize> State<N> {
     /// A photon that comes from `from` has arrived, if it came by way of a smooth surface.
     pub(super) fn arrive<const DISPERSIVE: bool>(&mut self, point: DVec3, from: &Ray, ior: f64) {
         let image = self.trail.and_then(|trail| trail.image(from.direction, ior));
-        let arrival = Arrival { point, from: from.origin, carried: self.carried::<DISPERSIVE>(), image };
+        let arrival = Arrival { point, from: from.origin, carried: self.carried::<DISPERSIVE>(), image, way: self.way.reversed() };
         self.arrival = (self.smooth_events > 0).then_some(arrival);
     }
 
     /// A smooth event; only what the guide may have found still has another way to be found.
-    pub(super) fn pass_smoothly(&mut self) {
+    pub(super) fn pass_smoothly(&mut self, passes: bool) {
         self.smooth_events += 1;
+        self.way = self.way.then(passes);
         if self.vertex.as_ref().is_some_and(|vertex| vertex.look.is_none()) {
             self.vertex = None;
         }

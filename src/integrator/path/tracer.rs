@@ -13,7 +13,7 @@ use super::guide::Guide;
 use super::image::Trail;
 use super::ledger::Ledger;
 use super::plate::Plate;
-use super::state::{Arrival, Look, Purpose, Scatterer, State, Vertex};
+use super::state::{Arrival, Look, Purpose, Scatterer, State, Vertex, Way};
 use crate::bsdf::{self, Bsdf, Interface, Scattered};
 use crate::camera::Camera;
 use crate::geometry::Ray;
@@ -180,7 +180,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             _ if is_direct => lighting.pdf(&vertex.receiver, direction, met),
             _ if state.smooth_events > MOST_SMOOTH => 0.0,
             (Some(guide), Some(Look { region, probability })) => {
-                probability * guide.pdf(region, vertex.receiver.point, vertex.direction)
+                probability * guide.pdf(region, vertex.receiver.point, vertex.direction, state.way, state.chosen)
             }
             _ => 0.0,
         };
@@ -189,10 +189,14 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             return;
         }
         let pdf = if is_direct && state.is_cut_off { 0.0 } else { pdf };
+        if state.purpose == Purpose::Focused && pdf <= 0.0 {
+            // Rounding has put it just beyond the edge of its own lobe, where nothing may be left.
+            return;
+        }
         let weight = if DISPERSIVE {
             1.0 / (state.r + vertex.r_over_pdf * pdf).mean()
         } else {
-            1.0 / (1.0 + vertex.r_over_pdf.hero() * pdf)
+            1.0 / (state.r.hero() + vertex.r_over_pdf.hero() * pdf)
         };
         self.ledger.add(state.throughput * seen * weight, emission);
     }
@@ -318,6 +322,12 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             return false;
         }
         let [mut u_lobe, u, v, u_roulette] = numbers.draw();
+        if let Some(way) = state.wanted {
+            let Some(passes) = way.at(state.smooth_events) else { return false };
+            if surface.bsdf.is_clear() {
+                u_lobe = if passes { 1.0 } else { 0.0 };
+            }
+        }
         let explores = state.purpose == Purpose::Photon && u_roulette < 2.0 * EXPLORED;
         if explores {
             u_lobe = if u_roulette < EXPLORED { 0.0 } else { 1.0 - f32::EPSILON };
@@ -326,6 +336,19 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         if state.purpose == Purpose::Photon && sample.pdf.hero() < 1.0 {
             let probability = sample.pdf.hero();
             state.throughput *= probability / ((1.0 - 2.0 * EXPLORED) * probability + EXPLORED);
+        }
+        let is_smooth = !matches!(sample.scattered, Scattered::Toward(_));
+        if is_smooth {
+            let passes = sample.scattered != Scattered::Mirror;
+            if state.wanted.is_some_and(|way| way.at(state.smooth_events) != Some(passes)) {
+                return false;
+            }
+            if surface.bsdf.is_clear() {
+                state.chosen *= sample.pdf.hero();
+            }
+            if state.wanted.is_some_and(|_| surface.bsdf.is_clear()) {
+                // The choice was certain, and counts as if it were not: see `meet`.
+            }
         }
         state.depth = state.depth.after(sample.event);
         if !state.depth.is_within(&limits) {
@@ -356,17 +379,18 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                     direction: turned,
                 });
                 (state.smooth_events, state.is_cut_off) = (0, false);
+                (state.way, state.chosen) = (Way::START, 1.0);
                 (turned, passes)
             }
             Scattered::Mirror => {
-                state.pass_smoothly();
+                state.pass_smoothly(false);
                 let ior = medium.jet();
                 let scattering = mirror(ior.ior * direction, &met.surface, &ior);
                 state.turn(&scattering);
                 ((scattering.momentum_out / ior.ior).normalize(), false)
             }
             Scattered::Refract => {
-                state.pass_smoothly();
+                state.pass_smoothly(true);
                 let (ior_i, ior_t) = (medium.jet(), far_medium.jet());
                 let scattering = refract_or_reflect(ior_i.ior * direction, &met.surface, &ior_i, &ior_t);
                 state.turn(&scattering);
@@ -379,7 +403,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 ((scattering.momentum_out / ior).normalize(), passes)
             }
             Scattered::Straight => {
-                state.pass_smoothly();
+                state.pass_smoothly(true);
                 (direction, true)
             }
         };
@@ -419,6 +443,9 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     /// Roulette: a path goes on with the probability of what it still carries.
     fn survives(&self, state: &mut State<N>, u: f32) -> bool {
         // As a mean over the lanes: that is what the pixel gets.
+        if state.purpose == Purpose::Focused {
+            return !state.throughput.is_black();
+        }
         let carried = state.carried::<DISPERSIVE>().mean() * state.squeezed;
         if !(carried > 0.0 && carried.is_finite()) {
             return false;
