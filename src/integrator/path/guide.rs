@@ -174,7 +174,7 @@ impl Guide {
 
     /// Probability with which a path that carries `weight` looks for light from the region.
     pub(super) fn probability(&self, id: RegionId, weight: f32) -> f32 {
-        (weight * self.get(id).probability).clamp(0.0, 1.0)
+        (weight * self.get(id).probability).clamp(0.0, knob("G_MOST", 1.0))
     }
 
     /// The region about a point; `None` where no focused light is known of.
@@ -298,7 +298,7 @@ impl Region {
         }
         let irradiance = (f64::from(total) / area).min(f64::from(f32::MAX)) as f32;
         let share = 1.0 / (1.0 + others(center) / irradiance);
-        region.probability = (LOOKS * share).max(LEAST);
+        region.probability = (knob("G_LOOKS", LOOKS) * share).max(knob("G_LEAST", LEAST));
         Some(region)
     }
 

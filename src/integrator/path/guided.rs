@@ -22,11 +22,26 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         numbers: &PathSampler,
     ) {
         let (Some(guide), Some(Look { region, probability, .. })) = (self.setting.guide, surface.look) else { return };
-        if u_look >= probability {
-            return;
+        let count = (probability + u_look) as u32;
+        let mut numbers = numbers.clone();
+        for index in 0..count {
+            numbers = numbers.branch();
+            let each = (index as f32, 1.0 / count as f32);
+            self.look(walk, surface, state, each, &mut numbers.clone());
         }
-        let mut numbers = numbers.branch();
+    }
+
+    fn look(
+        &mut self,
+        walk: &Walk<'a>,
+        surface: &Scatterer<'_, N>,
+        state: &State<N>,
+        (index, part): (f32, f32),
+        numbers: &mut PathSampler,
+    ) {
+        let (Some(guide), Some(Look { region, .. })) = (self.setting.guide, surface.look) else { return };
         let [u_lobe, u, v, u_cap] = numbers.draw();
+        let u_lobe = (u_lobe + index) * part;
         let Some((direction, wanted)) = guide.sample(region, surface.met.point, [u_lobe, u_cap], [u, v]) else { return };
         let wi = surface.frame.to_local(direction);
         if wi.z <= 0.0 || direction.dot(surface.n_g) <= 0.0 {
@@ -66,7 +81,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         }
         let mut walk = walk.clone();
         walk.turn(surface.met, direction, false);
-        self.follow(&mut walk, &mut found, &mut numbers);
+        self.follow(&mut walk, &mut found, numbers);
         self.ledger.return_to(kept);
     }
 }
