@@ -2,11 +2,11 @@
 
 use glam::{DMat3, DVec3};
 
+use super::Patch;
 use super::choice::Infinite;
 use super::cone::Cone;
 use super::dome::Dome;
 use super::shape::{Disk, Ellipsoid, Line, Rectangle, Toward, Tube, frame};
-use super::Patch;
 use super::tree::LightBounds;
 use crate::geometry::Bounds;
 use crate::light::{self, Distant, Light, Shape};

@@ -5,7 +5,12 @@
 //! Space is divided into regions with about as many photons each. A region keeps the points of the glass that its photons
 //! left, so that directions to them are right from everywhere in it (as the parallax-aware mixtures of L. Ruppert, S. Herholz, H. Lensch,
 //! "Robust fitting of parallax-aware mixtures for path guiding", TOG 39(4), 2020), and gives each two caps of directions as wide as its
-//! neighbours are far: the density of a direction is the sum over the caps it is in.
+//! neighbours are far; where the image of the light that the photon knows (`image.rs`) is smaller than the narrow one, it takes its place. The density
+//! of a direction is the sum over the lobes it is in.
+//!
+//! At an interface a photon was reflected or went through, and a look that is drawn from its narrow lobe does the same (as Z. Fan et al., "Manifold path
+//! guiding for importance sampling specular chains", TOG 42(6), 2023, choose the chain's kind): what a facet mirrors faintly is found
+//! with certainty. Looks from wide caps choose by chance, like paths.
 //!
 //! A guide only says where to look. What is found is weighed against the BSDF's own directions, so that a poor guide costs time and
 //! never light.
@@ -13,14 +18,14 @@
 use std::f32::consts::TAU;
 use std::ops::Range;
 
-use super::state::Way;
 use super::image::{Image, ImageLobe, ImageLobes};
+use super::state::Way;
 use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
-/// Photons of a region at least, twice as many at most. Twice that gives
-/// the caustics of `benches/RESULTS.md` 11 % less error (gem) and 31 % more (ball).
-const REGION: usize = 32;
+/// Photons of a region at least, twice as many at most. Error of the caustics of `benches/RESULTS.md`: 32 or 64 make up to 4 % more, 128
+/// and 256 up to 20 %.
+const REGION: usize = 48;
 
 /// The neighbours that a narrow cap and a wide one around it reach to, and the part of the directions that are of the wide one: what
 /// photons have missed lies beside what they found.
@@ -35,11 +40,12 @@ const WIDEST: f32 = 1.0;
 /// changes nothing where regions touch.
 const MARGIN: f64 = 0.25;
 
-/// Probability of a look over the share that focused light has of all: the best for looks that cost a third of a path and leave twice the
-/// square of what they find as variance, beside a tenth of the square of all light from everything else.
-const LOOKS: f32 = 8.0;
+/// Looks over the share that focused light has of all, and the most. Half as many looks, one at most, leave 60 % more error in the caustics of
+/// `benches/RESULTS.md` (gem) or 30 % (ball) for 20 or 5 % less time, twice as many 15 or 10 % less error for 20 or 10 % more.
+const LOOKS: f32 = 16.0;
+const MOST: f32 = 4.0;
 
-/// The least: what is found must not come as a rare spark.
+/// The least: what is found must not come as a rare spark. A fifth of it is worse, twice as much is no better.
 const LEAST: f32 = 0.1;
 
 /// From a larger solid angle, in sr, chance is about as good: a diffuse surface's own directions fill as much as 3π/2 (1/∫ p² dω).
@@ -69,6 +75,7 @@ struct Lobe {
     heights: [f32; 2],
     /// In the place of the narrow cap.
     image: Option<ImageLobe>,
+    /// What a look from the narrow cap or the image takes.
     way: Way,
     share: f32,
     /// Shares up to this one with it, 0..=1.
@@ -81,7 +88,17 @@ struct Lobes {
     toward: [Vec4; 3],
     /// Of the narrow caps and the wide ones: sin² of the half-angle, and the cap's share over its solid angle, 1/sr.
     caps: [(Vec4, Vec4); 2],
+    /// Of the narrow ones.
     ways: Vec4,
+}
+
+/// A density of looks per solid angle.
+#[derive(Clone, Copy, Debug, Default)]
+struct Density {
+    /// Of those that take a certain way.
+    certain: Vec4,
+    /// Of those that choose.
+    choosing: Vec4,
 }
 
 impl Lobes {
@@ -93,16 +110,14 @@ impl Lobes {
             (sin2, lanes(&|lobe| part * lobe.share / (TAU * lobe.heights[cap])))
         };
         let toward = [0, 1, 2].map(|axis| lanes(&|lobe| lobe.toward[axis]));
-        let wide = knob("G_WIDE", WIDE);
-        let mut caps = [cap(0, 1.0 - wide), cap(1, wide)];
-        let has_cap = lanes(&|lobe| if lobe.image.is_some() { 0.0 } else { 1.0 });
-        caps[0].1 *= has_cap;
-        Self { toward, caps, ways: lanes(&|lobe| lobe.way.code()) }
+        let mut caps = [cap(0, 1.0 - WIDE), cap(1, WIDE)];
+        caps[0].1 *= lanes(&|lobe| f32::from(u8::from(lobe.image.is_none())));
+        Self { toward, caps, ways: lanes(&|lobe| lobe.way.number()) }
     }
 
-    /// The densities of a direction from `at`.
+    /// The densities of a direction from `at` by the way with a number.
     #[inline]
-    fn pdf(&self, at: Vec3, direction: Vec3, code: Vec4) -> (Vec4, Vec4) {
+    fn pdf(&self, at: Vec3, direction: Vec3, way: Vec4) -> Density {
         let [x, y, z] = self.toward;
         let (x, y, z) = (x - at.x, y - at.y, z - at.z);
         let along = x * direction.x + y * direction.y + z * direction.z;
@@ -113,7 +128,8 @@ impl Lobes {
         let within = |(sin2, density): (Vec4, Vec4)| {
             Vec4::select(across2.cmplt(sin2 * length2) & along.cmpgt(Vec4::ZERO), density, Vec4::ZERO)
         };
-        (Vec4::select(self.ways.cmpeq(code), within(self.caps[0]), Vec4::ZERO), within(self.caps[1]))
+        let certain = Vec4::select(self.ways.cmpeq(way), within(self.caps[0]), Vec4::ZERO);
+        Density { certain, choosing: within(self.caps[1]) }
     }
 }
 
@@ -122,17 +138,26 @@ impl Lobes {
 struct Region {
     center: DVec3,
     half_extent: DVec3,
-    /// Probability of a look from here by a path of full weight.
-    probability: f32,
+    /// Looks from here by a path of full weight.
+    count: f32,
     lobes: Vec<Lobe>,
-    /// The same by four.
-    densities: Vec<Lobes>,
+    /// The same by four: caps, and those lobes that are images.
+    caps: Vec<Lobes>,
     images: Vec<ImageLobes>,
 }
 
 /// Which region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct RegionId(u32);
+
+/// A direction to look in.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drawn {
+    /// A unit vector.
+    pub(super) direction: DVec3,
+    /// The way that the look takes; `None` if it chooses by chance.
+    pub(super) way: Option<Way>,
+}
 
 /// A node of the division of space.
 #[derive(Clone, Copy, Debug)]
@@ -172,9 +197,9 @@ impl Guide {
         self.regions[id.0 as usize].as_ref().expect("only regions have numbers")
     }
 
-    /// Probability with which a path that carries `weight` looks for light from the region.
-    pub(super) fn probability(&self, id: RegionId, weight: f32) -> f32 {
-        (weight * self.get(id).probability).clamp(0.0, knob("G_MOST", 1.0))
+    /// How many times, as a mean, a path that carries `weight` looks for light from the region.
+    pub(super) fn count(&self, id: RegionId, weight: f32) -> f32 {
+        (weight * self.get(id).count).clamp(0.0, MOST)
     }
 
     /// The region about a point; `None` where no focused light is known of.
@@ -194,22 +219,18 @@ impl Guide {
         }
     }
 
-    /// A direction from `point`, in the region, and its density per solid angle; `u_lobe` chooses where about, `u_cap` how near.
-    pub(super) fn sample(
-        &self,
-        id: RegionId,
-        point: DVec3,
-        [u_lobe, u_cap]: [f32; 2],
-        u: [f32; 2],
-    ) -> Option<(DVec3, Option<Way>)> {
+    /// A direction from `point`, in the region, and the way that the look takes from there if it is certain; `u_lobe` chooses where
+    /// about, `u_cap` how near.
+    pub(super) fn sample(&self, id: RegionId, point: DVec3, [u_lobe, u_cap]: [f32; 2], u: [f32; 2]) -> Option<Drawn> {
         let region = self.get(id);
         let at = (point - region.center).as_vec3();
         let chosen = region.lobes.partition_point(|lobe| lobe.up_to <= u_lobe).min(region.lobes.len() - 1);
         let lobe = &region.lobes[chosen];
-        let is_wide = u_cap < knob("G_WIDE", WIDE);
+        let is_wide = u_cap < WIDE;
+        let way = (!is_wide).then_some(lobe.way);
         if let Some(image) = lobe.image.filter(|_| !is_wide) {
-            let direction = image.direction(at, u).as_dvec3().normalize();
-            return Some((direction, Some(lobe.way)));
+            let direction = image.direction(at, u).as_dvec3().try_normalize()?;
+            return Some(Drawn { direction, way });
         }
         let axis = (lobe.toward - at).try_normalize()?;
         let height = lobe.heights[usize::from(is_wide)] * u[0];
@@ -217,10 +238,11 @@ impl Guide {
         let (x, y) = axis.any_orthonormal_pair();
         let (sin_phi, cos_phi) = libm::sincosf(TAU * u[1]);
         let direction = (x * (sin * cos_phi) + y * (sin * sin_phi) + axis * cos).as_dvec3().normalize();
-        Some((direction, (!is_wide).then_some(lobe.way)))
+        Some(Drawn { direction, way })
     }
 
-    /// The density per solid angle with which [`sample`](Self::sample) draws a direction.
+    /// The density per solid angle with which [`sample`](Self::sample) draws a direction and its look takes the way, over the probability
+    /// `chosen` with which one that chooses does.
     pub(super) fn pdf(&self, id: RegionId, point: DVec3, direction: DVec3, way: Way, chosen: f32) -> f32 {
         let region = self.get(id);
         region.pdf((point - region.center).as_vec3(), direction.as_vec3(), way, chosen)
@@ -277,59 +299,57 @@ impl Region {
             let heights = [narrow, wide].map(|height| height.clamp(NARROWEST, WIDEST));
             let share = photons[i].flux / total;
             up_to += share;
-            let image = photons[i].image.filter(|image| (image.size() as f32) < knob("G_MAX", 1e9)).map(|image| image.lobe(photons[i].point - center));
+            // An image's size on the plane of tangents is at least the solid angle.
+            let is_smaller = |image: &Image| image.size() < f64::from(TAU * heights[0]);
+            let image = photons[i].image.filter(is_smaller).map(|image| image.lobe(photons[i].point - center));
             Lobe { toward: towards[i], heights, image, way: photons[i].way, share, up_to }
         };
         let lobes: Vec<Lobe> = (0..photons.len()).map(lobe).collect();
-        let densities = lobes.chunks(4).map(Lobes::new).collect();
+        let caps = lobes.chunks(4).map(Lobes::new).collect();
+        let image = |lobe: &Lobe| Some((lobe.image?, lobe.way, (1.0 - WIDE) * lobe.share));
+        let images: Vec<_> = lobes.iter().filter_map(image).collect();
+        let images = images.chunks(4).map(ImageLobes::new).collect();
         // Surfaces are flat: the area is that of the two largest extents.
         let DVec3 { x, y, z } = max - min;
         let area = (x * y).max(y * z).max(z * x);
-        let with: Vec<(ImageLobe, Way, f32)> =
-            lobes.iter().filter_map(|l: &Lobe| Some((l.image?, l.way, (1.0 - knob("G_WIDE", WIDE)) * l.share))).collect();
-        let images = with.chunks(4).map(ImageLobes::new).collect();
-        let mut region = Self { images, center, half_extent, probability: 1.0, lobes, densities };
+        let mut region = Self { center, half_extent, count: 1.0, lobes, caps, images };
         // 1 over the mean density of its own directions.
-        let mean: f32 =
-            (photons.iter().zip(&directions)).map(|(p, d)| p.flux / total * region.pdf(Vec3::ZERO, *d, p.way, 1.0)).sum();
+        let mean: f32 = (photons.iter().zip(&directions))
+            .map(|(p, d)| p.flux / total * region.pdf(Vec3::ZERO, *d, p.way, 1.0))
+            .sum();
         let solid_angle = 1.0 / mean;
         if solid_angle > LARGE {
             return None;
         }
         let irradiance = (f64::from(total) / area).min(f64::from(f32::MAX)) as f32;
         let share = 1.0 / (1.0 + others(center) / irradiance);
-        region.probability = (knob("G_LOOKS", LOOKS) * share).max(knob("G_LEAST", LEAST));
+        region.count = (LOOKS * share).max(LEAST);
         Some(region)
     }
 
     fn pdf(&self, at: Vec3, direction: Vec3, way: Way, chosen: f32) -> f32 {
-        let code = Vec4::splat(way.code());
-        let (mut own, mut any) = (Vec4::ZERO, Vec4::ZERO);
-        for lobes in &self.densities {
-            let (narrow, wide) = lobes.pdf(at, direction, code);
-            own += narrow;
-            any += wide;
+        let way = Vec4::splat(way.number());
+        let mut all = Density::default();
+        for caps in &self.caps {
+            let Density { certain, choosing } = caps.pdf(at, direction, way);
+            all.certain += certain;
+            all.choosing += choosing;
         }
-        for lobes in &self.images {
-            own += lobes.pdf(at, direction, code);
+        for images in &self.images {
+            all.certain += images.pdf(at, direction, way);
         }
-        (own * (1.0 / chosen) + any).element_sum()
+        // Of many faint reflections the probability may be no number any more.
+        (all.certain * (1.0 / chosen.max(f32::MIN_POSITIVE)) + all.choosing).element_sum()
     }
-}
-
-pub(super) fn knob(name: &'static str, default: f32) -> f32 {
-    use std::collections::HashMap;
-    use std::sync::{LazyLock, RwLock};
-    static ALL: LazyLock<RwLock<HashMap<&'static str, f32>>> = LazyLock::new(RwLock::default);
-    if let Some(&v) = ALL.read().unwrap().get(name) { return v; }
-    let v = std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default);
-    ALL.write().unwrap().insert(name, v);
-    v
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::image::Trail;
     use super::*;
+    use crate::geometry::Ray;
+    use crate::lighting::Patch;
+    use crate::ray::Curvature;
 
     fn uniform(i: u32, salt: u32) -> f32 {
         let mut z = u64::from(i) << 32 | u64::from(salt);
@@ -347,34 +367,79 @@ mod tests {
                 from: DVec3::new(0.3 * around(i, 3), 1.0, 0.3 * around(i, 4)),
                 flux: 0.1 + uniform(i, 5),
                 image: None,
+                way: Way::START.then(i % 3 == 0),
             })
             .collect()
     }
 
+    /// The image of a lamp of 0.2 × 0.2 at (0, 2, 0), seen from below with nothing in between.
+    fn with_images(mut photons: Vec<Photon>) -> Vec<Photon> {
+        for (photon, i) in photons.iter_mut().zip(0..) {
+            let around = |salt: u32| f64::from(uniform(i, salt)) * 2.0 - 1.0;
+            let half = [DVec3::X * 0.1, DVec3::Z * 0.1];
+            let origin = DVec3::Y * 2.0 + around(6) * half[0] + around(7) * half[1];
+            let direction = (photon.point - origin).normalize();
+            let patch = Patch { center: DVec3::Y * 2.0, half, is_infinite: false };
+            let mut trail = Trail::new(patch, &Ray { origin, direction, time: 0.0 }).unwrap();
+            trail.transfer_to((photon.point - origin).length(), direction, DVec3::Y, Curvature::Plane, 1.0);
+            photon.image = trail.image(direction, 1.0);
+            photon.from = photon.point.lerp(origin, 0.5);
+        }
+        photons
+    }
+
     #[test]
     fn directions_are_drawn_with_their_density() {
-        let guide = Guide::new(photons(2000), |_, _| 0.0).unwrap();
-        let point = DVec3::new(0.4, 0.0, -0.3);
-        let id = guide.region(point).unwrap();
-        // Of a smooth function: its mean over what is drawn, and ∫ of it times the density, with ∫ of the density itself.
-        let f = |d: DVec3| (3.0 * d.x).sin() + d.z * d.y;
-        let count = 400_000;
-        let (mut drawn, mut integral, mut whole) = (0.0, 0.0, 0.0);
-        for i in 0..count {
-            let u = |salt| uniform(i, salt);
-            let (direction, pdf) = guide.sample(id, point, [u(1), u(2)], [u(3), u(4)]).unwrap();
-            assert!((f64::from(pdf / guide.pdf(id, point, direction)) - 1.0).abs() < 1e-6);
-            drawn += f(direction) / f64::from(count);
-            // Even directions of the upper hemisphere, where all caps are.
-            let (y, phi) = (f64::from(u(5)), f64::from(TAU * u(6)));
-            let r = (1.0 - y * y).sqrt();
-            let direction = DVec3::new(r * phi.cos(), y, r * phi.sin());
-            let weight = f64::from(guide.pdf(id, point, direction)) * f64::from(TAU) / f64::from(count);
-            whole += weight;
-            integral += weight * f(direction);
+        let ways = [false, true].map(|passes| Way::START.then(passes));
+        for photons in [photons(2000), with_images(photons(2000))] {
+            let guide = Guide::new(photons, |_, _| 0.0).unwrap();
+            let point = DVec3::new(0.4, 0.0, -0.3);
+            let id = guide.region(point).unwrap();
+            // A look that chooses by chance takes the first way with this probability.
+            let chosen = 0.3f32;
+            let chances = [chosen, 1.0 - chosen];
+            // Of a smooth function: its mean over what is drawn, and ∫ of it times the density, with ∫ of the density itself.
+            let f = |d: DVec3| (3.0 * d.x).sin() + d.z * d.y;
+            let count = 400_000;
+            let (mut drawn, mut integral, mut whole) = ([0.0; 2], [0.0; 2], 0.0);
+            for i in 0..count {
+                let u = |salt| uniform(i, salt);
+                let Drawn { direction, way } = guide.sample(id, point, [u(1), u(2)], [u(3), u(4)]).unwrap();
+                let taken = way.unwrap_or(ways[usize::from(u(7) >= chosen)]);
+                let way = usize::from(taken == ways[1]);
+                drawn[way] += f(direction) / f64::from(count);
+                assert!(guide.pdf(id, point, direction, taken, chances[way]) > 0.0 || i % 1000 != 0);
+                // Even directions of the cone in which all lobes are, half of the upper hemisphere.
+                let (y, phi) = (f64::from(u(5)), f64::from(TAU * u(6)));
+                let r = (1.0 - y * y).sqrt();
+                let direction = DVec3::new(r * phi.cos(), y, r * phi.sin());
+                for way in 0..2 {
+                    let pdf = chances[way] * guide.pdf(id, point, direction, ways[way], chances[way]);
+                    let weight = f64::from(pdf) * f64::from(TAU) / f64::from(count);
+                    whole += weight;
+                    integral[way] += weight * f(direction);
+                }
+            }
+            assert!((whole - 1.0).abs() < 0.01, "{whole}");
+            for way in 0..2 {
+                assert!((drawn[way] - integral[way]).abs() < 0.01, "{drawn:?} {integral:?}");
+            }
         }
-        assert!((whole - 1.0).abs() < 0.01, "{whole}");
-        assert!((drawn - integral).abs() < 0.01, "{drawn} {integral}");
+    }
+
+    #[test]
+    fn images_are_where_the_lamp_is() {
+        let guide = Guide::new(with_images(photons(2000)), |_, _| 0.0).unwrap();
+        for point in [DVec3::new(0.9, 0.0, 0.9), DVec3::new(-0.5, 0.0, 0.1), DVec3::ZERO] {
+            let id = guide.region(point).unwrap();
+            for i in 0..1000 {
+                let u = |salt| uniform(i, salt);
+                // Not from the wide caps.
+                let Drawn { direction, way } = guide.sample(id, point, [u(1), 1.0], [u(3), u(4)]).unwrap();
+                let at = point + direction * ((2.0 - point.y) / direction.y);
+                assert!(way.is_some() && at.x.abs() < 0.1001 && at.z.abs() < 0.1001, "{at}");
+            }
+        }
     }
 
     #[test]
@@ -384,7 +449,7 @@ mod tests {
             let id = guide.region(point).unwrap();
             let lens = (0..1000).filter(|&i| {
                 let u = |salt| uniform(i, salt);
-                let (direction, _) = guide.sample(id, point, [u(1), u(2)], [u(3), u(4)]).unwrap();
+                let Drawn { direction, .. } = guide.sample(id, point, [u(1), u(2)], [u(3), u(4)]).unwrap();
                 let at = point + direction * ((1.0 - point.y) / direction.y);
                 at.x.abs() < 0.35 && at.z.abs() < 0.35
             });
@@ -400,14 +465,15 @@ mod tests {
         assert!(guide.region(DVec3::new(0.0, 3.0, 0.0)).is_none());
         assert!(guide.region(DVec3::new(9.0, 0.0, 0.0)).is_none());
         assert!(Guide::new(Vec::new(), |_, _| 0.0).is_none() && Guide::new(photons(5), |_, _| 0.0).is_none());
-        let broken = Photon { point: DVec3::NAN, from: DVec3::ZERO, flux: f32::NAN, image: None };
+        let broken = Photon { point: DVec3::NAN, from: DVec3::ZERO, flux: f32::NAN, image: None, way: Way::START };
         assert!(Guide::new(vec![broken; 500], |_, _| 0.0).is_none());
         // All in one point: a region without extent.
-        let same = Photon { point: DVec3::ONE, from: DVec3::Y * 3.0, flux: 1.0, image: None };
+        let same = Photon { point: DVec3::ONE, from: DVec3::Y * 3.0, flux: 1.0, image: None, way: Way::START };
         let guide = Guide::new(vec![same; 500], |_, _| 0.0).unwrap();
         let id = guide.region(DVec3::ONE).unwrap();
-        let (direction, pdf) = guide.sample(id, DVec3::ONE, [0.5; 2], [0.5; 2]).unwrap();
-        assert!(direction.is_finite() && pdf.is_finite() && (0.0..=1.0).contains(&guide.probability(id, 1.0)));
+        let Drawn { direction, .. } = guide.sample(id, DVec3::ONE, [0.5; 2], [0.5; 2]).unwrap();
+        let pdf = guide.pdf(id, DVec3::ONE, direction, Way::START, 0.0);
+        assert!(direction.is_finite() && pdf.is_finite() && (0.0..=MOST).contains(&guide.count(id, 1.0)));
     }
 
     #[test]
@@ -416,21 +482,27 @@ mod tests {
             let (y, phi) = (f64::from(uniform(i, 1)), f64::from(TAU * uniform(i, 2)));
             let r = (1.0 - y * y).sqrt();
             let point = DVec3::new(f64::from(uniform(i, 3)), 0.0, f64::from(uniform(i, 4)));
-            Photon { point, from: point + DVec3::new(r * phi.cos(), y, r * phi.sin()), flux: 1.0, image: None }
+            Photon {
+                point,
+                from: point + DVec3::new(r * phi.cos(), y, r * phi.sin()),
+                flux: 1.0,
+                image: None,
+                way: Way::START,
+            }
         };
         assert!(Guide::new((0..1000).map(from_everywhere).collect(), |_, _| 0.0).is_none());
     }
 
     #[test]
     fn faint_light_is_looked_for_seldom() {
-        let probability = |others: f32| {
+        let count = |others: f32| {
             let guide = Guide::new(photons(2000), |_, _| others)?;
             let id = guide.region(DVec3::ZERO)?;
-            Some(guide.probability(id, 1.0))
+            Some(guide.count(id, 1.0))
         };
         // 2000 photons of 0.6 on 4: an irradiance of 300 from a tenth of a steradian or two.
-        assert_eq!(probability(0.0), Some(1.0));
-        assert!(probability(1e4).is_some_and(|p| (0.15..0.35).contains(&p)));
-        assert_eq!(probability(1e9), Some(LEAST));
+        assert_eq!(count(0.0), Some(MOST));
+        assert!(count(1e4).is_some_and(|n| (0.3..0.7).contains(&n)));
+        assert_eq!(count(1e9), Some(LEAST));
     }
 }

@@ -1,8 +1,10 @@
 //! Light that a surface receives by way of smooth glass and mirrors, from where the guide says.
 //!
-//! From every vertex where the guide knows of such light a path of its own looks for it: it costs a chain, as a sampled light costs a
-//! shadow ray, and is weighed against the BSDF's own directions.
+//! From every vertex where the guide knows of such light paths of their own look for it: each costs a chain, as a sampled light costs a
+//! shadow ray. What they meet is weighed against the BSDF's own directions: with the density p of these, q of n looks as a mean, and
+//! the probability c of the choices at interfaces on the way, f / (p c + n q) is what light counts. q is known where light is met, not before.
 
+use super::guide::Drawn;
 use super::state::{Look, Purpose, Scatterer, State, Vertex};
 use super::tracer::Tracer;
 use crate::bsdf;
@@ -21,28 +23,31 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         u_look: f32,
         numbers: &PathSampler,
     ) {
-        let (Some(guide), Some(Look { region, probability, .. })) = (self.setting.guide, surface.look) else { return };
-        let count = (probability + u_look) as u32;
+        let Some(Look { count, .. }) = surface.look else { return };
+        let count = (count + u_look) as u32;
         let mut numbers = numbers.clone();
         for index in 0..count {
             numbers = numbers.branch();
-            let each = (index as f32, 1.0 / count as f32);
-            self.look(walk, surface, state, each, &mut numbers.clone());
+            self.look(walk, surface, state, [index, count], &mut numbers.clone());
         }
     }
 
+    /// One look of several.
     fn look(
         &mut self,
         walk: &Walk<'a>,
         surface: &Scatterer<'_, N>,
         state: &State<N>,
-        (index, part): (f32, f32),
+        [index, count]: [u32; 2],
         numbers: &mut PathSampler,
     ) {
         let (Some(guide), Some(Look { region, .. })) = (self.setting.guide, surface.look) else { return };
         let [u_lobe, u, v, u_cap] = numbers.draw();
-        let u_lobe = (u_lobe + index) * part;
-        let Some((direction, wanted)) = guide.sample(region, surface.met.point, [u_lobe, u_cap], [u, v]) else { return };
+        // Each looks somewhere else.
+        let u_lobe = (index as f32 + u_lobe) / count as f32;
+        let Some(Drawn { direction, way }) = guide.sample(region, surface.met.point, [u_lobe, u_cap], [u, v]) else {
+            return;
+        };
         let wi = surface.frame.to_local(direction);
         if wi.z <= 0.0 || direction.dot(surface.n_g) <= 0.0 {
             return;
@@ -56,7 +61,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             smooth_events: 0,
             depth: state.depth.after(event),
             squeezed: state.squeezed,
-            wanted,
+            wanted: way,
             throughput: state.throughput * value,
             r: state.r * f.pdf,
             vertex: Some(Vertex {

@@ -72,7 +72,7 @@ impl Trail {
         self.transfer_to(met.hit.distance, ray.direction, met.surface.n_g, met.surface.curvature, ior);
     }
 
-    fn transfer_to(&mut self, distance: f64, direction: DVec3, n_g: DVec3, curvature: Curvature, ior: f64) {
+    pub(super) fn transfer_to(&mut self, distance: f64, direction: DVec3, n_g: DVec3, curvature: Curvature, ior: f64) {
         let transfer = Transfer { distance, direction, medium: IorJet::constant(ior), n_g, curvature };
         self.by_place.transfer(&transfer);
         self.by_direction.transfer(&transfer);
@@ -84,11 +84,13 @@ impl Trail {
         self.by_direction.scatter(scattering);
     }
 
-    /// What it has seen, arriving in a direction; `None` if all of it is one point or none.
-    pub(super) fn image(mut self, direction: DVec3, ior: f64) -> Option<Image> {
+    /// What it has seen, arriving in a direction; `None` if that is no plane image: light from all about meets in one point.
+    pub(super) fn image(&self, direction: DVec3, ior: f64) -> Option<Image> {
         let (x, y) = direction.any_orthonormal_pair();
-        self.transfer_to(0.0, direction, direction, Curvature::Plane, ior);
-        let columns = [self.by_place.screen()?, self.by_direction.screen()?].concat();
+        // On the plane across.
+        let mut end = *self;
+        end.transfer_to(0.0, direction, direction, Curvature::Plane, ior);
+        let columns = [end.by_place.screen()?, end.by_direction.screen()?].concat();
         let column = |i: usize| {
             let c = columns[i];
             let (point, turn) = (c.point, c.momentum / ior);
@@ -120,53 +122,48 @@ impl Image {
         4.0 / self.determinant().abs()
     }
 
-    /// As a lobe of a region about `center`, for a photon that arrived at `point`.
+    /// As a lobe of a region, for a photon that arrived at `point`, relative to the region's centre.
     pub(super) fn lobe(&self, point: DVec3) -> ImageLobe {
         let [z, x, y] = self.axes;
-        let p = point;
         let along = |[a, b]: [DVec2; 2], k: usize| (x * a[k] + y * b[k]).as_vec3();
         let by_point = [0, 1].map(|k| along(self.by_point, k));
         let at_zero = [0, 1].map(|k| {
             let row = x * self.by_point[0][k] + y * self.by_point[1][k];
-            (self.place[k] - row.dot(p)) as f32
+            (self.place[k] - row.dot(point)) as f32
         });
         let by_direction = [0, 1].map(|k| along(self.by_direction, k));
         let [a, b] = self.by_direction;
         let d = self.determinant();
         // Of the inverse of the matrix with the columns a, b.
         let back = [(x * b.y - y * a.y) / d, (y * a.x - x * b.x) / d].map(|v| v.as_vec3());
-        ImageLobe {
-            axis: z.as_vec3(),
-            at_zero,
-            by_point,
-            by_direction,
-            back,
-            density: (d.abs() / 4.0) as f32,
-        }
+        ImageLobe { axis: z.as_vec3(), at_zero, by_point, by_direction, back, density: (d.abs() / 4.0) as f32 }
     }
 }
 
 /// An image in a region, relative to its centre.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ImageLobe {
+    /// The plane of tangents is that of the directions d with d·axis = 1.
     axis: Vec3,
+    /// The place on the light is at_zero + by_point·x + by_direction·d.
     at_zero: [f32; 2],
     by_point: [Vec3; 2],
     by_direction: [Vec3; 2],
+    /// How d changes with that place.
     back: [Vec3; 2],
     /// On the plane of tangents.
     density: f32,
 }
 
 impl ImageLobe {
-    /// The direction from `at` to a place of the light, each coordinate 0..1.
+    /// Along the direction from `at` to a place of the light, each coordinate 0..1.
     pub(super) fn direction(&self, at: Vec3, u: [f32; 2]) -> Vec3 {
         let offset = |k: usize| 2.0 * u[k] - 1.0 - self.at_zero[k] - self.by_point[k].dot(at);
         self.axis + self.back[0] * offset(0) + self.back[1] * offset(1)
     }
 }
 
-/// Four of them.
+/// Four of them, lane by lane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ImageLobes {
     axis: [Vec4; 3],
@@ -182,31 +179,142 @@ fn dot([x, y, z]: [Vec4; 3], v: Vec3) -> Vec4 {
 }
 
 impl ImageLobes {
-    /// With their shares.
+    /// With their ways and shares, up to four; further lanes have no density.
     pub(super) fn new(lobes: &[(ImageLobe, Way, f32)]) -> Self {
-        let lanes =
-            |of: &dyn Fn(&ImageLobe, f32) -> f32| Vec4::from_array(std::array::from_fn(|i| lobes.get(i).map_or(0.0, |l| of(&l.0, l.2))));
+        let lanes = |of: &dyn Fn(&ImageLobe, f32) -> f32| {
+            Vec4::from_array(std::array::from_fn(|i| lobes.get(i).map_or(0.0, |l| of(&l.0, l.2))))
+        };
         let vector = |of: &dyn Fn(&ImageLobe) -> Vec3| [0, 1, 2].map(|axis| lanes(&|l, _| of(l)[axis]));
         Self {
             axis: vector(&|l| l.axis),
             at_zero: [0, 1].map(|k| lanes(&|l, _| l.at_zero[k])),
             by_point: [0, 1].map(|k| vector(&|l| l.by_point[k])),
             by_direction: [0, 1].map(|k| vector(&|l| l.by_direction[k])),
-            ways: Vec4::from_array(std::array::from_fn(|i| lobes.get(i).map_or(0.0, |l| l.1.code()))),
+            ways: Vec4::from_array(std::array::from_fn(|i| lobes.get(i).map_or(0.0, |(_, way, _)| way.number()))),
             density: lanes(&|l, share| share * l.density),
         }
     }
 
-    /// Density per solid angle of a direction from `at`.
+    /// Densities per solid angle of a direction from `at` by the way with a number.
     #[inline]
-    pub(super) fn pdf(&self, at: Vec3, direction: Vec3, code: Vec4) -> Vec4 {
+    pub(super) fn pdf(&self, at: Vec3, direction: Vec3, way: Vec4) -> Vec4 {
         let along = dot(self.axis, direction);
         let inverse = along.recip();
         let within = |k: usize| {
             let place = self.at_zero[k] + dot(self.by_point[k], at) + dot(self.by_direction[k], direction) * inverse;
             place.abs().cmple(Vec4::ONE)
         };
-        let is_in = self.ways.cmpeq(code) & within(0) & within(1) & along.cmpgt(Vec4::ZERO);
+        let is_in = self.ways.cmpeq(way) & within(0) & within(1) & along.cmpgt(Vec4::ZERO);
         Vec4::select(is_in, self.density * inverse * inverse * inverse, Vec4::ZERO)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ray::{LocalSurface, NormalField, refract_or_reflect};
+
+    const IOR: f64 = 1.5;
+
+    /// A prism's faces, each a point and a normal: the way from the lamp above goes in at the first, out at the second.
+    fn faces() -> [(DVec3, DVec3); 2] {
+        [(DVec3::Y * 2.0, DVec3::new(0.2, 1.0, 0.1).normalize()), (DVec3::Y, DVec3::new(0.1, -1.0, 0.3).normalize())]
+    }
+
+    fn surface(normal: DVec3) -> LocalSurface {
+        LocalSurface { n_g: normal, n_s: normal, curvature: Curvature::Plane, field: NormalField::Flat }
+    }
+
+    /// Where a ray through the prism, one way or the other, is at a height, and its direction there.
+    fn through(
+        mut point: DVec3,
+        mut direction: DVec3,
+        faces: [(DVec3, DVec3); 2],
+        height: f64,
+        trail: &mut Option<Trail>,
+    ) -> [DVec3; 2] {
+        let mut iors = [1.0, IOR];
+        let end = (DVec3::Y * height, DVec3::Y);
+        for (index, (on, normal)) in [faces[0], faces[1], end].into_iter().enumerate() {
+            let distance = (on - point).dot(normal) / direction.dot(normal);
+            point += distance * direction;
+            if let Some(trail) = trail {
+                trail.transfer_to(distance, direction, normal, Curvature::Plane, iors[0]);
+            }
+            if index < 2 {
+                let jets = iors.map(IorJet::constant);
+                let scattering = refract_or_reflect(iors[0] * direction, &surface(normal), &jets[0], &jets[1]);
+                if let Some(trail) = trail {
+                    trail.scatter(&scattering);
+                }
+                direction = (scattering.momentum_out / iors[1]).normalize();
+                iors.reverse();
+            }
+        }
+        [point, direction]
+    }
+
+    #[test]
+    fn looks_through_a_prism_reach_the_lamp_with_an_error_of_second_order() {
+        let [first, second] = faces();
+        let error = |size: f64| {
+            let (center, half) = (DVec3::Y * 4.0, [DVec3::X * size, DVec3::Z * size]);
+            let (place, direction) = (DVec2::new(0.3, -0.2), DVec3::new(0.1, -1.0, 0.05).normalize());
+            let origin = center + place.x * half[0] + place.y * half[1];
+            let patch = Patch { center, half, is_infinite: false };
+            let mut trail = Trail::new(patch, &Ray { origin, direction, time: 0.0 });
+            let [arrived, direction] = through(origin, direction, [first, second], 0.0, &mut trail);
+            let lobe = trail.unwrap().image(direction, 1.0).unwrap().lobe(DVec3::ZERO);
+            // From beside where the photon arrived.
+            let beside = DVec3::new(0.7, 0.0, -0.4) * size;
+            [[0.1f32, 0.9], [0.8, 0.4]].map(|u| {
+                let toward = lobe.direction(beside.as_vec3(), u).as_dvec3().normalize();
+                let [at, _] = through(arrived + beside, toward, [second, first], 4.0, &mut None);
+                let wanted = u.map(|u| 2.0 * f64::from(u) - 1.0);
+                (patch.coordinates(at, DVec3::Y).unwrap() - DVec2::from(wanted)).length()
+            })
+        };
+        // In units of the lamp's size, of which the second order leaves one.
+        let [large, small] = [0.1, 0.01].map(error);
+        for (large, small) in large.into_iter().zip(small) {
+            assert!(large < 0.1 && small < 0.15 * large && small > 0.0, "{large} {small}");
+        }
+    }
+
+    #[test]
+    fn the_density_of_an_image_is_that_of_its_directions() {
+        let patch = Patch { center: DVec3::Y, half: [DVec3::X * 0.2, DVec3::new(0.1, 0.0, 0.3)], is_infinite: false };
+        let (origin, at) = (DVec3::new(0.1, 1.0, 0.1), DVec3::new(-0.3, 0.0, 0.2));
+        let direction = (at - origin).normalize();
+        let mut trail = Trail::new(patch, &Ray { origin, direction, time: 0.0 }).unwrap();
+        trail.transfer_to((at - origin).length(), direction, DVec3::Y, Curvature::Plane, 1.0);
+        let lobe = trail.image(direction, 1.0).unwrap().lobe(DVec3::ZERO);
+        let lobes = ImageLobes::new(&[(lobe, Way::START, 0.5)]);
+        let here = DVec3::new(0.2, 0.0, 0.0);
+        let toward = lobe.direction(here.as_vec3(), [0.3, 0.6]).normalize();
+        // Even on the lamp: distance² over area and cosine.
+        let distance = 1.0 / f64::from(toward.y);
+        let expected = 0.5 * distance * distance * distance / patch.half[0].cross(patch.half[1]).length() / 4.0;
+        let pdf = lobes.pdf(here.as_vec3(), toward, Vec4::splat(Way::START.number()));
+        assert!((f64::from(pdf.x) / expected - 1.0).abs() < 1e-5 && pdf.y == 0.0, "{pdf} {expected}");
+        let other = lobes.pdf(here.as_vec3(), toward, Vec4::splat(Way::START.then(true).number()));
+        let beside = lobes.pdf(here.as_vec3(), Vec3::new(0.9, 0.4, 0.0), Vec4::splat(Way::START.number()));
+        assert_eq!([other, beside], [Vec4::ZERO; 2]);
+    }
+
+    #[test]
+    fn the_sky_has_images_too() {
+        let sky = DVec3::new(0.3, 1.0, -0.2).normalize();
+        let (x, y) = sky.any_orthonormal_pair();
+        let patch = Patch { center: sky, half: [x * 0.01, y * 0.01], is_infinite: true };
+        let wi = (sky + 0.5 * patch.half[0]).normalize();
+        let mut trail = Trail::new(patch, &Ray { origin: wi * 100.0, direction: -wi, time: 0.0 }).unwrap();
+        trail.transfer_to(100.0, -wi, DVec3::Y, Curvature::Plane, 1.0);
+        let lobe = trail.image(-wi, 1.0).unwrap().lobe(DVec3::ZERO);
+        for point in [Vec3::ZERO, Vec3::new(5.0, 0.0, 3.0)] {
+            let toward = lobe.direction(point, [0.0, 1.0]).as_dvec3().normalize();
+            let expected = (sky - patch.half[0] + patch.half[1]).normalize();
+            assert!((toward - expected).length() < 1e-4, "{toward} {expected}");
+        }
     }
 }

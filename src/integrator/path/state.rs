@@ -25,7 +25,8 @@ pub(super) enum Purpose {
     Photon,
 }
 
-/// Which way a path takes from one smooth event to the next: a bit for each, the first one highest, 1 if it passes; above them a 1.
+/// Which way a path takes from one smooth event to the next: a bit for each, the first one highest, 1 if it passes; above them a 1. Only the
+/// last 15 are known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Way(u16);
 
@@ -53,8 +54,8 @@ impl Way {
         (0..self.events()).rev().filter_map(|event| self.at(event)).fold(Self::START, Self::then)
     }
 
-    /// As a number.
-    pub(super) fn code(self) -> f32 {
+    /// As a number, for lanes of numbers.
+    pub(super) fn number(self) -> f32 {
         f32::from(self.0)
     }
 }
@@ -64,8 +65,8 @@ impl Way {
 pub(super) struct Look {
     /// Where the guide knows of some.
     pub(super) region: RegionId,
-    /// With this probability.
-    pub(super) probability: f32,
+    /// So many times, as a mean.
+    pub(super) count: f32,
 }
 
 /// The last vertex that chose a direction by a density.
@@ -120,10 +121,12 @@ pub(super) struct State<const N: usize> {
     pub(super) alpha: f32,
     /// Squared index of the medium over that of the first: what refraction has taken from β without taking light, and gives back.
     pub(super) squeezed: f32,
+    /// Its worth after the first event that was not smooth: about what the pixel is worth.
+    pub(super) first: Option<f32>,
     /// Where a photon has arrived.
     pub(super) arrival: Option<Arrival<N>>,
     /// How a photon's way changes with its beginning.
-    pub(super) trail: Option<Trail>,
+    pub(super) trail: Option<Box<Trail>>,
 }
 
 impl<const N: usize> State<N> {
@@ -145,6 +148,7 @@ impl<const N: usize> State<N> {
             sees_through: purpose == Purpose::Picture,
             alpha: 0.0,
             squeezed: 1.0,
+            first: None,
             arrival: None,
             trail: None,
         }
@@ -164,6 +168,11 @@ impl<const N: usize> State<N> {
         if DISPERSIVE { self.throughput * (1.0 / self.r.mean()) } else { self.throughput }
     }
 
+    /// What a unit of light from here counts on average over the lanes, for that is what the pixel gets.
+    pub(super) fn worth<const DISPERSIVE: bool>(&self) -> f32 {
+        self.carried::<DISPERSIVE>().mean() * self.squeezed
+    }
+
     /// The path's light ends in what is no part of the picture: as much of the pixel stays open.
     pub(super) fn open<const DISPERSIVE: bool>(&mut self) {
         if self.alpha > 0.0 {
@@ -173,8 +182,14 @@ impl<const N: usize> State<N> {
 
     /// A photon that comes from `from` has arrived, if it came by way of a smooth surface.
     pub(super) fn arrive<const DISPERSIVE: bool>(&mut self, point: DVec3, from: &Ray, ior: f64) {
-        let image = self.trail.and_then(|trail| trail.image(from.direction, ior));
-        let arrival = Arrival { point, from: from.origin, carried: self.carried::<DISPERSIVE>(), image, way: self.way.reversed() };
+        let image = self.trail.as_ref().and_then(|trail| trail.image(from.direction, ior));
+        let arrival = Arrival {
+            point,
+            from: from.origin,
+            carried: self.carried::<DISPERSIVE>(),
+            image,
+            way: self.way.reversed(),
+        };
         self.arrival = (self.smooth_events > 0).then_some(arrival);
     }
 
@@ -218,4 +233,23 @@ pub(super) struct Scatterer<'s, const N: usize> {
     pub(super) far: Option<Option<MediumId>>,
     /// Whether focused light is looked for.
     pub(super) look: Option<Look>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_way_back_has_the_same_events_in_the_other_order() {
+        let events = [true, false, false, true, true, false];
+        let way = events.into_iter().fold(Way::START, Way::then);
+        let back = way.reversed();
+        assert_eq!(back.reversed(), way);
+        for (index, event) in (0..).zip(events) {
+            assert_eq!((way.at(index), back.at(5 - index)), (Some(event), Some(event)));
+        }
+        assert_eq!((way.at(6), Way::START.at(0), Way::START.reversed()), (None, None, Way::START));
+        // What is too long is forgotten at its beginning, without a panic.
+        (0..40).fold(way, |way, _| way.then(false)).reversed();
+    }
 }
