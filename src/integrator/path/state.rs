@@ -35,7 +35,7 @@ impl Way {
     pub(super) const START: Self = Self(1);
 
     fn events(self) -> u32 {
-        15 - self.0.leading_zeros()
+        self.0.checked_ilog2().unwrap_or(0)
     }
 
     /// After another event.
