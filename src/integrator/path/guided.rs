@@ -25,7 +25,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     ) {
         let Some(Look { count, .. }) = surface.look else { return };
         let count = (count + u_look) as u32;
-        let mut numbers = numbers.clone();
+        let mut numbers = *numbers;
         for index in 0..count {
             numbers = numbers.branch();
             self.look(walk, surface, state, [index, count], &mut numbers.clone());
