@@ -251,9 +251,20 @@ impl<'a> Lighting<'a> {
         u_light: f32,
         u: [f32; 2],
     ) -> Option<LightSample<N>> {
+        self.sample_where_chosen(receiver, wavelengths, || u_light, u)
+    }
+
+    /// The same; `u_light` is not asked for where there is but one light.
+    pub fn sample_where_chosen<const N: usize>(
+        &self,
+        receiver: &Receiver,
+        wavelengths: &Wavelengths<N>,
+        u_light: impl FnOnce() -> f32,
+        u: [f32; 2],
+    ) -> Option<LightSample<N>> {
         let chooser = chooser(receiver);
         let is_linked = |set| self.view.scene.is_linked(set, receiver.object);
-        let (number, probability) = self.choice.sample(&chooser, is_linked, refined(u_light, u))?;
+        let (number, probability) = self.choice.sample(&chooser, is_linked, || refined(u_light(), u))?;
         let (p, u) = (receiver.point, u.map(f64::from));
         let light = match self.emitters[number as usize] {
             Emitter::Piece { object, primitive } => {

@@ -5,13 +5,13 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use glam::DVec3;
 
 use super::Scene;
-use super::material::{Below, Kind, Material, ShadingFrame, Surface, SurfaceAt};
+use super::material::{Below, Finish, Kind, Material, ShadingFrame, Surface, SurfaceAt};
 use crate::bsdf::Interface;
 use crate::error::{Error, Result};
 use crate::geometry::{Aggregate, Departures, Hit, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
-use crate::ray::LocalSurface;
+use crate::ray::UnitNormals;
 use crate::spectrum::{Wavelength, Wavelengths};
 use crate::texture::Program;
 
@@ -207,17 +207,30 @@ impl<'a> View<'a> {
         self.with_results(surface, hit, |results| surface.at(results, wavelengths, interface))
     }
 
+    /// The same as far as light has to know it, which of most surfaces is little.
+    #[inline]
+    pub fn finish<const N: usize>(
+        &self,
+        hit: &Hit,
+        id: u32,
+        wavelengths: &Wavelengths<N>,
+        interface: Interface<N>,
+    ) -> Finish<N> {
+        let other = || self.surface(hit, id, wavelengths, interface);
+        self.surface_of(id).finish(wavelengths, interface, other)
+    }
+
     /// The frame of what [`surface`](Self::surface) said of `hit`, met at `time`: its normal after the normal map, on the side of
     /// the geometric normal, and its tangent along u, turned as the material says.
     pub fn shading_frame<const N: usize>(
         &self,
         hit: &Hit,
         time: f64,
-        local: &LocalSurface,
+        normals: &UnitNormals,
         at: &SurfaceAt<N>,
     ) -> ShadingFrame {
         let authored = if at.has_direction() { self.aggregate.tangents(hit, time) } else { None };
-        ShadingFrame::new(local, authored, at.normal_map, at.rotation)
+        ShadingFrame::new(normals, authored, at.normal_map, at.rotation)
     }
 
     /// The share of the surface at `hit` that is there, 0..=1: 1 − this goes straight on, as if nothing were met. The same as

@@ -18,11 +18,11 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         walk: &Walk<'a>,
         surface: &Scatterer<'_, N>,
         state: &State<N>,
-        u_look: f32,
+        u_look: impl FnOnce() -> f32,
         numbers: &PathSampler,
     ) {
         let (Some(guide), Some(Look { region, probability })) = (self.setting.guide, surface.look) else { return };
-        if u_look >= probability {
+        if u_look() >= probability {
             return;
         }
         let mut numbers = numbers.branch();

@@ -9,7 +9,11 @@ use crate::integrator::frame::Frame;
 use crate::integrator::walk::SurfacePoint;
 use crate::lighting::Receiver;
 use crate::optics::media::MediumId;
+use crate::ray::UnitNormals;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
+
+/// A surface as a path meets it.
+pub(super) type Met = SurfacePoint<UnitNormals>;
 
 /// What a path is followed for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -145,7 +149,7 @@ impl<const N: usize> State<N> {
 
 /// A surface that scatters, where the path has met it.
 pub(super) struct Scatterer<'s, const N: usize> {
-    pub(super) met: &'s SurfacePoint,
+    pub(super) met: &'s Met,
     /// Geometric normal on the side of the path.
     pub(super) n_g: DVec3,
     pub(super) frame: Frame,
