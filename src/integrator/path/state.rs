@@ -77,6 +77,8 @@ pub(super) struct State<const N: usize> {
     pub(super) alpha: f32,
     /// Squared index of the medium over that of the first: what refraction has taken from β without taking light, and gives back.
     pub(super) squeezed: f32,
+    /// Its worth after the first event that was not smooth: about what the pixel is worth.
+    pub(super) first: Option<f32>,
     /// Where a photon has arrived.
     pub(super) arrival: Option<Arrival<N>>,
 }
@@ -97,6 +99,7 @@ impl<const N: usize> State<N> {
             sees_through: purpose == Purpose::Picture,
             alpha: 0.0,
             squeezed: 1.0,
+            first: None,
             arrival: None,
         }
     }
@@ -113,6 +116,11 @@ impl<const N: usize> State<N> {
     /// β / mean(r): what radiance from here counts.
     pub(super) fn carried<const DISPERSIVE: bool>(&self) -> SampledSpectrum<N> {
         if DISPERSIVE { self.throughput * (1.0 / self.r.mean()) } else { self.throughput }
+    }
+
+    /// What a unit of light from here counts on average over the lanes, for that is what the pixel gets.
+    pub(super) fn worth<const DISPERSIVE: bool>(&self) -> f32 {
+        self.carried::<DISPERSIVE>().mean() * self.squeezed
     }
 
     /// The path's light ends in what is no part of the picture: as much of the pixel stays open.
