@@ -143,11 +143,13 @@ impl<'a> View<'a> {
     }
 
     /// `material_id` at `hit`, 0 for none.
+    #[inline]
     pub fn material_id(&self, hit: &Hit) -> u32 {
-        let ids = self.scene.objects.ids(hit.instance).material_ids;
+        let ids = self.scene.objects.material_ids(hit.instance);
         ids[self.slot(hit, ids) as usize]
     }
 
+    #[inline]
     fn slot(&self, hit: &Hit, ids: &[u32]) -> u32 {
         // One material, one slot: no lookup of the face.
         if ids.len() == 1 { 0 } else { self.aggregate.slot(hit) }
@@ -175,6 +177,7 @@ impl<'a> View<'a> {
     }
 
     /// Whether the surface at `hit`, whose material is `id`, is as its material says, something else, or not there.
+    #[inline]
     pub fn presence(&self, hit: &Hit, id: u32) -> Presence {
         let Some(index) = id.checked_sub(1) else { return Presence::AsStated };
         let material = &self.scene.materials[index as usize];
@@ -235,6 +238,7 @@ impl<'a> View<'a> {
 
     /// The share of the surface at `hit` that is there, 0..=1: 1 − this goes straight on, as if nothing were met. The same as
     /// [`SurfaceAt::presence`], for rays that only ask what is in their way.
+    #[inline]
     pub fn share_present(&self, hit: &Hit, id: u32) -> f32 {
         let surface = self.surface_of(id);
         if surface.is_present() { 1.0 } else { self.with_results(surface, hit, |results| surface.presence(results)) }
@@ -245,6 +249,7 @@ impl<'a> View<'a> {
         self.surface_of(id).is_rough()
     }
 
+    #[inline]
     fn surface_of(&self, id: u32) -> &'a Surface {
         match id.checked_sub(1) {
             Some(index) => &self.scene.materials[index as usize].surface,

@@ -1,7 +1,8 @@
 //! The parallelogram, sampled by the solid angle that it subtends if it is a rectangle.
 //!
 //! C. Ureña, M. Fajardo, A. King, "An area-preserving parametrization for spherical rectangles", CGF 32(4), 2013; the symbols
-//! are theirs. From afar, where it makes next to no difference, and for a sheared rectangle, points are even over the area.
+//! are theirs. Where it makes little difference, from afar or straight before it, and for a sheared rectangle, points are even over the
+//! area.
 
 use std::f64::consts::PI;
 
@@ -12,9 +13,13 @@ use crate::math::trig::sin_cos;
 
 /// Below this solid angle the area is sampled: the rounding of the angles, 2^-50, is 2^-30 of it.
 const SMALLEST: f64 = 1.0 / 1_048_576.0;
-/// From so many of its longer sides' halves on the area is sampled: from there the density of its points by angle, which goes with the
-/// cube of their distances, hardly differs, by 3 % in root mean square.
-const FAR: f64 = 64.0;
+/// From so many of its longer sides' halves on points may be even over the area: before, their density by angle, which goes with the cube
+/// of their distances, has a pole nearby.
+const FAR: f64 = 2.0;
+/// They are where the distances differ little: with q from the middle to the receiver, q' its part along the plane and l half of the
+/// longer side, a distance's cube differs by √3 |q'| l / q² in root mean square, 35 % at this |q'| l / q². Measured in a room lit by a
+/// lamp: 3 % more error in 25 % less time; 0.1 is 1 % and 12 %, 0.3 is 9 % and 25 %.
+const OBLIQUE: f64 = 0.2;
 /// |cos| of the sides' angle up to which they count as perpendicular: rounding of a few products.
 const PERPENDICULAR: f64 = 1e-12;
 
@@ -121,10 +126,13 @@ impl Rectangle {
         (seen.solid_angle >= SMALLEST).then_some(seen)
     }
 
-    /// The same where it is worth its while.
+    /// The same where it is worth its while: a point by solid angle takes several times as long as one by area.
     fn seen_from_near(&self, p: DVec3, height: f64) -> Option<Seen> {
         let longer = self.lengths[0].max(self.lengths[1]);
-        if (p - self.center).length_squared() > FAR * FAR * longer * longer { None } else { self.seen(p, height) }
+        let (l2, q2) = (longer * longer, (p - self.center).length_squared());
+        let along2 = q2 - height * height;
+        let is_even = q2 > FAR * FAR * l2 && along2 * l2 < OBLIQUE * OBLIQUE * q2 * q2;
+        if is_even { None } else { self.seen(p, height) }
     }
 
     /// How large it looks from a point, steradian; `None` where that is little and from where it is dark.
