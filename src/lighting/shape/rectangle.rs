@@ -109,6 +109,7 @@ impl Rectangle {
     }
 
     /// Height of a point over the plane; `None` on the side that is dark and in the plane.
+    #[inline]
     fn height(&self, p: DVec3) -> Option<f64> {
         let height = (p - self.center).dot(self.normal);
         (if self.is_two_sided { height != 0.0 } else { height > 0.0 }).then_some(height)
@@ -170,9 +171,11 @@ impl Rectangle {
     }
 
     /// Distance at which a ray meets the side that shines, and where between the sides, −1..1.
+    #[inline]
     pub(in crate::lighting) fn meet(&self, origin: DVec3, direction: DVec3) -> Option<(f64, [f64; 2])> {
         let height = self.height(origin)?;
         let rise = direction.dot(self.normal);
+        // Most rays do not go there.
         if height * rise >= 0.0 {
             return None;
         }

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::super::dialect::every_id;
 use super::super::{Context, Kind, Material, SMOOTH_ROUGHNESS, ScalarIor, compile_alone};
 use super::*;
-use crate::bsdf::SMOOTH_ALPHA;
+use crate::bsdf::{Bsdf, SMOOTH_ALPHA};
 use crate::scene::description;
 use crate::spectrum::visible;
 
