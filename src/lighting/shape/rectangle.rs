@@ -141,22 +141,33 @@ impl Rectangle {
         self.seen(p, self.height(p)?).map(|seen| seen.solid_angle)
     }
 
+    /// The same where that is what is sampled.
+    pub(in crate::lighting) fn sampled_solid_angle(&self, p: DVec3) -> Option<f64> {
+        self.seen_from_near(p, self.height(p)?).map(|seen| seen.solid_angle)
+    }
+
     pub(in crate::lighting) fn sample(&self, p: DVec3, u: [f64; 2]) -> Option<Toward> {
         let height = self.height(p)?;
-        let (to, by_angle) = match self.seen_from_near(p, height) {
-            Some(seen) => {
-                let [x, y] = seen.point(u).map(|a| a * height.abs());
-                (x * self.axes[0] + y * self.axes[1] - height * self.normal, Some(1.0 / seen.solid_angle))
-            }
-            None => {
-                let [s, t] = u.map(|u| 2.0 * u - 1.0);
-                (self.center + s * self.half[0] + t * self.half[1] - p, None)
-            }
-        };
+        if let Some(seen) = self.seen_from_near(p, height) {
+            return Some(self.by_angle(&seen, height, u));
+        }
+        let [s, t] = u.map(|u| 2.0 * u - 1.0);
+        let to = self.center + s * self.half[0] + t * self.half[1] - p;
         let distance = to.length();
-        let wi = to * (1.0 / distance);
-        let pdf_solid_angle = by_angle.unwrap_or_else(|| self.by_area(height, distance));
-        Some(Toward { wi, distance, pdf_solid_angle })
+        Some(Toward { wi: to * (1.0 / distance), distance, pdf_solid_angle: self.by_area(height, distance) })
+    }
+
+    /// By [the solid angle](Self::solid_angle) wherever it has one.
+    pub(in crate::lighting) fn sample_by_angle(&self, p: DVec3, u: [f64; 2]) -> Option<Toward> {
+        let height = self.height(p)?;
+        self.seen(p, height).map(|seen| self.by_angle(&seen, height, u))
+    }
+
+    fn by_angle(&self, seen: &Seen, height: f64, u: [f64; 2]) -> Toward {
+        let [x, y] = seen.point(u).map(|a| a * height.abs());
+        let to = x * self.axes[0] + y * self.axes[1] - height * self.normal;
+        let distance = to.length();
+        Toward { wi: to * (1.0 / distance), distance, pdf_solid_angle: 1.0 / seen.solid_angle }
     }
 
     /// Of the direction that meets it at `distance`.
