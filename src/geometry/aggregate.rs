@@ -7,7 +7,9 @@ use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use super::departures::Crossing;
+use super::fused::{self, Fused, Piece, is_fusible};
 use super::meeting::{Nearest, Sides};
+use super::mesh::Mesh;
 use super::motion::Pose;
 use super::placed::{Frame, Placed, bounds_under, is_invertible, largest_reach};
 use super::start::{UNIT_ROUNDOFF, behind};
@@ -26,6 +28,8 @@ pub struct Aggregate {
     /// The point of the stage's world that is render space's zero.
     origin: DVec3,
     tree: Tree,
+    /// What most rays walk instead, where meshes are small.
+    pub(super) fused: Option<Fused>,
     /// Which instance each primitive of the tree is, where not all are in it: those without extent are left out.
     instances: Option<Vec<u32>>,
     /// Largest condition and largest translation of all instances.
@@ -57,9 +61,16 @@ pub(super) struct Footing<'a> {
     ray: &'a Ray,
     pub(super) departures: &'a Departures,
     magnitude: OnceCell<f64>,
+    /// |p| + the largest reach of all.
+    pub(super) at_most: f64,
 }
 
-impl Footing<'_> {
+impl<'a> Footing<'a> {
+    fn new(aggregate: &'a Aggregate, ray: &'a Ray, departures: &'a Departures) -> Self {
+        let at_most = ray.origin.abs().max_element() + aggregate.reach * MORE;
+        Self { aggregate, ray, departures, magnitude: OnceCell::new(), at_most }
+    }
+
     /// |p| + reach.
     pub(super) fn magnitude(&self) -> f64 {
         *self
@@ -104,6 +115,7 @@ impl Aggregate {
             numbering,
             origin,
             tree: Tree::default(),
+            fused: None,
             instances: None,
             spread: 1.0,
             farthest: 0.0,
@@ -121,7 +133,33 @@ impl Aggregate {
         all.tree = Tree::build(primitives, |i| {
             all.bounds_of(all.instance(i as u32)).expect("only instances with bounds are in the tree")
         });
+        all.fused = all.fuse(primitives as u32);
         all
+    }
+
+    /// One tree over the triangles of small meshes and the other instances, of which there are `count` in all.
+    fn fuse(&self, count: u32) -> Option<Fused> {
+        let reach = self.tree.reach();
+        let (mut meshes, mut others) = (Vec::new(), Vec::new());
+        for instance in (0..count).map(|i| self.instance(i)) {
+            match self.still_mesh(instance).filter(|(mesh, frame)| is_fusible(mesh, frame, reach)) {
+                Some((mesh, frame)) => meshes.push((instance, mesh, frame)),
+                None if others.len() < fused::OTHERS => others.push((instance, self.bounds_of(instance)?)),
+                None => return None,
+            }
+        }
+        Fused::new(&meshes, &others)
+    }
+
+    /// The mesh that stands still as a single instance; `None` if it is something else.
+    fn still_mesh(&self, instance: u32) -> Option<(&Mesh, &Frame)> {
+        match self.singles.get(instance as usize) {
+            Some((shape, Standing::Still(frame))) => match &**shape {
+                Shape::Mesh(mesh) => Some((mesh, frame)),
+                _ => None,
+            },
+            _ => None,
+        }
     }
 
     /// The instance that is the primitive `i` of the tree.
@@ -268,33 +306,59 @@ impl Aggregate {
     }
 
     /// Where a ray that starts on surfaces begins to look for them: behind its start by at least as much as any of them asks for.
-    fn looks_from(&self, ray: &Ray) -> f64 {
-        let magnitude = ray.origin.abs().max_element() + self.reach * MORE;
-        -behind(self.spread * (2.0 * magnitude + 2.0 * self.farthest))
+    fn looks_from(&self, footing: &Footing<'_>) -> f64 {
+        -behind(self.spread * (2.0 * footing.at_most + 2.0 * self.farthest))
     }
 
     /// The nearest surface that the ray meets; equal distances are decided by (instance, primitive).
     ///
     /// `departures` says which surfaces the ray starts on.
     pub fn intersect(&self, ray: &Ray, departures: &Departures) -> Option<Hit> {
-        let mut nearest = Nearest { hit: None, limit: f64::INFINITY };
-        if departures.is_none() {
-            self.tree.walk(ray.origin, ray.direction, 0.0, f64::INFINITY, self.spread, |i, _| {
-                let instance = self.instance(i);
-                self.with(instance, ray.time, |placed| placed.intersect(ray, instance, None, &mut nearest));
-                nearest.limit
-            });
-        } else {
-            let footing = Footing { aggregate: self, ray, departures, magnitude: OnceCell::new() };
-            let from = self.looks_from(ray);
+        let footing = Footing::new(self, ray, departures);
+        let standing = Some(&footing).filter(|_| !departures.is_none());
+        let from = if standing.is_some() { self.looks_from(&footing) } else { 0.0 };
+        let mut nearest = Nearest::before(f64::INFINITY);
+        let whole = |instance: u32, nearest: &mut Nearest| {
+            self.with(instance, ray.time, |placed| placed.intersect(ray, instance, standing, nearest));
+        };
+        let Some(fused) = &self.fused else {
             self.tree.walk(ray.origin, ray.direction, from, f64::INFINITY, self.spread, |i, _| {
-                let instance = self.instance(i);
-                let standing = Some(&footing);
-                self.with(instance, ray.time, |placed| placed.intersect(ray, instance, standing, &mut nearest));
+                whole(self.instance(i), &mut nearest);
                 nearest.limit
             });
+            return nearest.hit;
+        };
+        fused.walk(ray, [from, f64::INFINITY], self.spread, |Piece { instance, triangle }| {
+            match triangle {
+                None => whole(instance, &mut nearest),
+                Some(triangle) => {
+                    if let Some(hit) = self.meet(ray, instance, triangle, standing) {
+                        nearest.offer(hit);
+                    }
+                }
+            }
+            nearest.limit
+        });
+        let hit = nearest.hit?;
+        if nearest.is_doubtful(ray) {
+            // The mesh by itself tells entering and leaving apart.
+            nearest = Nearest::before(f64::INFINITY);
+            whole(hit.instance, &mut nearest);
+            return nearest.hit;
         }
-        nearest.hit
+        Some(hit)
+    }
+
+    /// Where the ray meets a triangle of a mesh that stands still.
+    #[inline]
+    fn meet(&self, ray: &Ray, instance: u32, triangle: u32, standing: Option<&Footing<'_>>) -> Option<Hit> {
+        let last = standing.and_then(|footing| footing.departures.crossings().last());
+        if last.is_some_and(|last| (last.instance, last.primitive) == (instance, triangle)) {
+            return None;
+        }
+        let (mesh, frame) = self.still_mesh(instance)?;
+        Placed { shape: &self.singles[instance as usize].0, frame, time: ray.time }
+            .meet(mesh, ray, instance, triangle, standing)
     }
 
     /// Whether some surface before `limit` blocks the ray. Each that the ray meets is asked, in no particular order and some
@@ -308,27 +372,39 @@ impl Aggregate {
         limit: f64,
         mut blocks: impl FnMut(&Hit) -> bool,
     ) -> bool {
-        let footing = Footing { aggregate: self, ray, departures, magnitude: OnceCell::new() };
+        let footing = Footing::new(self, ray, departures);
         let standing = Some(&footing).filter(|_| !departures.is_none());
-        let from = if standing.is_some() { self.looks_from(ray) } else { 0.0 };
+        let from = if standing.is_some() { self.looks_from(&footing) } else { 0.0 };
         let mut is_blocked = false;
-        self.tree.walk(ray.origin, ray.direction, from, limit, self.spread, |i, _| {
-            let instance = self.instance(i);
-            let mut meets = |hit: &Hit| hit.distance < limit && blocks(hit);
-            let met = self.with(instance, ray.time, |placed| placed.meets(ray, instance, standing, limit, &mut meets));
-            is_blocked |= met == Some(true);
-            // Nothing is before this.
-            if is_blocked { f64::NEG_INFINITY } else { limit }
-        });
+        let mut meets = |hit: &Hit| hit.distance < limit && blocks(hit);
+        let whole = |instance: u32, meets: &mut dyn FnMut(&Hit) -> bool| {
+            self.with(instance, ray.time, |placed| placed.meets(ray, instance, standing, limit, meets)) == Some(true)
+        };
+        // Nothing is before what blocks.
+        let left = |is_blocked| if is_blocked { f64::NEG_INFINITY } else { limit };
+        match &self.fused {
+            None => self.tree.walk(ray.origin, ray.direction, from, limit, self.spread, |i, _| {
+                is_blocked |= whole(self.instance(i), &mut meets);
+                left(is_blocked)
+            }),
+            Some(fused) => fused.walk(ray, [from, limit], self.spread, |Piece { instance, triangle }| {
+                is_blocked = is_blocked
+                    || match triangle {
+                        None => whole(instance, &mut meets),
+                        Some(triangle) => self.meet(ray, instance, triangle, standing).is_some_and(|hit| meets(&hit)),
+                    };
+                left(is_blocked)
+            }),
+        }
         is_blocked
     }
 
     /// A surface of an instance that `is_member`, which passes through the start of the ray, within rounding, and which the
     /// ray has not crossed there. Casts no further than that.
     pub fn coincident(&self, ray: &Ray, departures: &Departures, is_member: impl Fn(u32) -> bool) -> Option<Hit> {
-        let footing = Footing { aggregate: self, ray, departures, magnitude: OnceCell::new() };
+        let footing = Footing::new(self, ray, departures);
         let about = behind(self.spread * (2.0 * footing.magnitude() + 2.0 * self.farthest));
-        let mut nearest = Nearest { hit: None, limit: about };
+        let mut nearest = Nearest::before(about);
         self.tree.walk(ray.origin, ray.direction, -about, about, self.spread, |i, _| {
             let instance = self.instance(i);
             if is_member(instance) {
@@ -457,7 +533,7 @@ impl Aggregate {
     /// What `intersect` finds by asking every primitive: the law that trees are tested against.
     #[doc(hidden)]
     pub fn intersect_without_tree(&self, ray: &Ray) -> Option<Hit> {
-        let mut nearest = Nearest { hit: None, limit: f64::INFINITY };
+        let mut nearest = Nearest::before(f64::INFINITY);
         for instance in (0..self.numbering.len()).filter(|&i| self.bounds_of(i).is_some()) {
             self.with(instance, ray.time, |placed| {
                 let object = placed.ray(ray);

@@ -12,14 +12,31 @@ use super::{Hit, Ray, Shape};
 pub(super) struct Nearest {
     pub(super) hit: Option<Hit>,
     pub(super) limit: f64,
+    /// The smallest distance of all others.
+    second: f64,
 }
 
 impl Nearest {
+    /// Of hits before `limit`.
+    pub(super) fn before(limit: f64) -> Self {
+        Self { hit: None, limit, second: f64::INFINITY }
+    }
+
     pub(super) fn offer(&mut self, hit: Hit) {
         if self.hit.is_none_or(|best| is_before(&hit, &best)) {
+            if self.hit.is_some() {
+                self.second = self.limit;
+            }
             self.limit = hit.distance;
             self.hit = Some(hit);
+        } else {
+            self.second = self.second.min(hit.distance);
         }
+    }
+
+    /// Whether another hit is so near that digits do not tell which comes first.
+    pub(super) fn is_doubtful(&self, ray: &Ray) -> bool {
+        self.second - self.limit <= DOUBTFUL * (self.limit + ray.origin.abs().max_element())
     }
 }
 
@@ -107,6 +124,7 @@ impl Placed<'_> {
             arrival: footing.departures.arrival(),
             inverse: &self.frame.inverse,
             magnitude: move || self.start_magnitude(footing.magnitude(), object),
+            at_most: self.start_magnitude(footing.at_most, object),
         })
     }
 
@@ -130,7 +148,7 @@ impl Placed<'_> {
         blocks: &mut dyn FnMut(&Hit) -> bool,
     ) -> bool {
         let Shape::Mesh(mesh) = self.shape else {
-            let mut nearest = Nearest { hit: None, limit };
+            let mut nearest = Nearest::before(limit);
             self.intersect(ray, instance, standing, &mut nearest);
             // Far from the start, what lies beyond the first surface needs no care for where the ray stands.
             return nearest.hit.is_some_and(|first| {
@@ -156,6 +174,21 @@ impl Placed<'_> {
             if is_blocked { f64::NEG_INFINITY } else { limit }
         });
         is_blocked
+    }
+
+    /// Where the ray meets a triangle of a mesh that does not deform; of several that it meets this does not tell the first.
+    pub(super) fn meet(
+        &self,
+        mesh: &Mesh,
+        ray: &Ray,
+        instance: u32,
+        triangle: u32,
+        standing: Option<&Footing<'_>>,
+    ) -> Option<Hit> {
+        let object = self.ray(ray);
+        let start = self.start(&object, instance, standing);
+        let hit = mesh.meet_one(object.origin, object.direction, start.as_ref(), triangle)?;
+        Some(object.hit(instance, &hit))
     }
 
     pub(super) fn intersect(&self, ray: &Ray, instance: u32, standing: Option<&Footing<'_>>, nearest: &mut Nearest) {

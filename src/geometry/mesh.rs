@@ -413,28 +413,51 @@ impl Mesh {
                 return limit;
             }
             let corners = triangles[primitive as usize].map(&point);
-            let Some(hit) = sheared.intersect(corners) else { return limit };
-            let (distance, at_start) = match start {
-                None if hit.distance > 0.0 => (hit.distance, false),
-                None => return limit,
-                Some(start) => {
-                    let relative = corners.map(|p| p.wide() - origin);
-                    let relative_of = |primitive| self.corners(primitive, time).map(|p| p - origin);
-                    match start.triangle(primitive, &hit, direction, relative, relative_of) {
-                        Some(met) => (met.distance, met.at_start),
-                        None => return limit,
-                    }
-                }
-            };
-            let TriangleHit { barycentric, leaving, .. } = hit;
-            found(MeshHit { primitive, distance, barycentric, leaving, at_start })
+            self.meet(&sheared, (origin, direction, time), start, primitive, corners).map_or(limit, &mut found)
         };
         if triangles.len() <= FEW {
             (0..triangles.len() as u32).fold(limit, |limit, primitive| meet(primitive, limit));
             return;
         }
-        let from = start.map_or(0.0, |start| -behind((start.magnitude)()));
+        let from = start.map_or(0.0, |start| -behind(start.at_most));
         self.tree.walk(origin, direction, from, limit, 1.0, meet);
+    }
+
+    /// The crossing of a triangle that does not deform and was not the last that the ray has left.
+    pub(super) fn meet_one(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        start: Option<&Start<'_, impl Fn() -> f64>>,
+        primitive: u32,
+    ) -> Option<MeshHit> {
+        let points = self.points.as_slice();
+        let corners = self.triangles[primitive as usize].map(|p| &points[p as usize]);
+        self.meet(&ShearedRay::new(origin, direction), (origin, direction, 0.0), start, primitive, corners)
+    }
+
+    #[inline(always)]
+    fn meet<C: Corner>(
+        &self,
+        sheared: &ShearedRay,
+        (origin, direction, time): (DVec3, DVec3, f64),
+        start: Option<&Start<'_, impl Fn() -> f64>>,
+        primitive: u32,
+        corners: [C; 3],
+    ) -> Option<MeshHit> {
+        let hit = sheared.intersect(corners)?;
+        let (distance, at_start) = match start {
+            None if hit.distance > 0.0 => (hit.distance, false),
+            None => return None,
+            Some(start) => {
+                let relative = corners.map(|p| p.wide() - origin);
+                let relative_of = |primitive| self.corners(primitive, time).map(|p| p - origin);
+                let met = start.triangle(primitive, &hit, direction, relative, relative_of)?;
+                (met.distance, met.at_start)
+            }
+        };
+        let TriangleHit { barycentric, leaving, .. } = hit;
+        Some(MeshHit { primitive, distance, barycentric, leaving, at_start })
     }
 
     /// Calls `found` with every crossing at a distance > 0, asking every triangle.

@@ -2,7 +2,8 @@
 //!
 //! Conventions: *render space* is the stage's world minus the camera position, in f64. Points stay as authored, f32 in
 //! object space, and no transform is baked into them; rays go to object space instead. f32 boxes find what a ray may
-//! meet (`tree.rs`, `walk.rs`), f64 shapes decide it (`triangle.rs`, `sphere.rs`, `solid.rs`), so the tree never decides what is hit. Every
+//! meet (`tree.rs`, `walk.rs`), for small meshes together and with a look at their triangles (`fused.rs`, `sieve.rs`); f64 shapes
+//! decide it (`triangle.rs`, `sphere.rs`, `solid.rs`), so the tree never decides what is hit. Every
 //! tolerance is a rounding bound of the numbers at hand: scaling a scene by a power of two changes no bit.
 //!
 //! A triangle covers its border half-open, by exact signs (`triangle.rs`): a ray through an edge or a vertex of a closed
@@ -16,6 +17,7 @@ mod buffer;
 mod cuboid;
 mod cut;
 mod departures;
+mod fused;
 mod instances;
 mod meeting;
 mod mesh;
@@ -24,6 +26,7 @@ mod placed;
 mod polygons;
 mod profile;
 mod revolved;
+mod sieve;
 mod solid;
 mod sphere;
 mod start;

@@ -11,7 +11,7 @@ use super::{Ray, Shape};
 /// Relative deviation from a similarity that rounding alone explains: a few products of matrices.
 const SIMILARITY: f64 = 64.0 * f64::EPSILON;
 /// Rounding of a box on its way through a transform, in units of 2^-53 times what was added up.
-const BOX_ERRORS: f64 = 32.0;
+pub(super) const BOX_ERRORS: f64 = 32.0;
 
 /// A shape in render space.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +77,7 @@ impl Frame {
     }
 
     /// |L||v| + |t| for coordinates up to `extent`.
-    fn reach_of(&self, extent: f64) -> f64 {
+    pub(super) fn reach_of(&self, extent: f64) -> f64 {
         self.norm * extent + self.offset
     }
 

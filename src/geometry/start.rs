@@ -45,6 +45,8 @@ pub(super) struct Start<'a, M> {
     pub(super) inverse: &'a DMat3,
     /// ‖L⁻¹‖ (|p| + |t| + reach + ‖L‖ |o|): the numbers that were rounded. Most candidates end before it is asked for.
     pub(super) magnitude: M,
+    /// The same for the largest reach of all surfaces: at least as much.
+    pub(super) at_most: f64,
 }
 
 /// How far behind its start a ray looks, given the size of the numbers that were rounded.
@@ -86,11 +88,11 @@ impl<M: Fn() -> f64> Start<'_, M> {
         let larger = |a: f64, b: f64| if a > b { a } else { b };
         let size = corners.iter().fold(0.0, |size, p| larger(p.abs().max_element(), size));
         // Most are far away, beyond doubt: |e1||e2| is at least the area. The rest takes roots and quotients.
-        let magnitude = (self.magnitude)();
-        let most = FAR * UNIT_ROUNDOFF * (START_ERRORS * magnitude + TRIANGLE_ERRORS * size);
+        let most = FAR * UNIT_ROUNDOFF * (START_ERRORS * self.at_most + TRIANGLE_ERRORS * size);
         if raised * raised > most * most * (e1.length_squared() * e2.length_squared()) {
             return (hit.distance > 0.0).then_some(Met { distance: hit.distance, at_start: false });
         }
+        let magnitude = (self.magnitude)();
         let area = normal.length();
         let height = raised / area;
         let slenderness = e1.length() * e2.length() / area;

@@ -19,6 +19,8 @@ use rayon::prelude::*;
 /// Primitives in a leaf at most, and what a step down costs relative to a primitive's test (`benches/bvh.rs`).
 const LEAF: u32 = 4;
 const STEP_COST: f32 = 1.0;
+/// The same where four tests are one.
+const STEP_COST_OF_PACKS: f32 = 4.0;
 /// Share of the nodes that the builder tries to place better (`benches/bvh.rs`).
 const REINSERTION: f32 = 0.02;
 
@@ -37,24 +39,50 @@ pub(super) const fn stack_of(depth: usize) -> usize {
 pub(super) struct Node {
     /// Lower and upper bounds, one vector per axis. An empty lane has its lower bounds above its upper ones.
     pub(super) bounds: [[Vec4; 3]; 2],
-    /// First primitive (an index into the order) of a leaf; else the index of the child node.
-    pub(super) first: [u32; 4],
-    /// Primitives of a leaf; 0 for a child node.
-    pub(super) count: [u32; 4],
+    /// Packed.
+    pub(super) children: [u32; 4],
 }
 
 const _: () = assert!(std::mem::size_of::<Node>() == 128);
 
 impl Node {
-    const EMPTY: Self = Self { bounds: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]], first: [0; 4], count: [0; 4] };
+    const EMPTY: Self = Self { bounds: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]], children: [0; 4] };
 
-    fn set(&mut self, lane: usize, bounds: &Aabb, first: u32, count: u32) {
+    fn set(&mut self, lane: usize, bounds: &Aabb, child: Child) {
         for axis in 0..3 {
             self.bounds[0][axis][lane] = bounds.min[axis];
             self.bounds[1][axis][lane] = bounds.max[axis];
         }
-        self.first[lane] = first;
-        self.count[lane] = count;
+        self.children[lane] = child.pack();
+    }
+}
+
+/// What a lane of a node stands for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Child {
+    /// The node with an index.
+    Node(usize),
+    /// 1 to 4 primitives, from a place in the order that is a multiple of four.
+    Leaf { first: usize, count: u32 },
+}
+
+impl Child {
+    const LEAF: u32 = 1 << 31;
+
+    fn pack(self) -> u32 {
+        match self {
+            Self::Node(index) => index as u32,
+            Self::Leaf { first, count } => Self::LEAF | first as u32 | (count - 1),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn unpack(packed: u32) -> Self {
+        if packed & Self::LEAF == 0 {
+            return Self::Node(packed as usize);
+        }
+        let place = packed & !Self::LEAF;
+        Self::Leaf { first: (place & !3) as usize, count: (place & 3) + 1 }
     }
 }
 
@@ -62,7 +90,7 @@ impl Node {
 #[derive(Debug, Default)]
 pub(crate) struct Tree {
     pub(super) nodes: Vec<Node>,
-    /// Primitives, leaf after leaf.
+    /// Primitives, leaf after leaf; every leaf begins at a multiple of four, and what fills the gaps belongs to none.
     pub(super) order: Vec<u32>,
     /// What a traversal holds at most.
     pub(super) stack: usize,
@@ -95,16 +123,29 @@ impl Bounds {
 impl Tree {
     /// A tree over `count` primitives with finite bounds.
     pub(crate) fn build(count: usize, bounds_of: impl Fn(usize) -> Bounds + Sync) -> Self {
-        let all = (0..count).into_par_iter().map(&bounds_of).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
-        Self::within(&all, count, bounds_of)
+        Self::with_steps(STEP_COST, count, bounds_of)
     }
 
-    /// The same where the box of them `all` is known.
+    /// The same with full leaves, for primitives that are [sifted](super::walk::Sift) all at once.
+    pub(super) fn of_packs(count: usize, bounds_of: impl Fn(usize) -> Bounds + Sync) -> Self {
+        Self::with_steps(STEP_COST_OF_PACKS, count, bounds_of)
+    }
+
+    fn with_steps(step_cost: f32, count: usize, bounds_of: impl Fn(usize) -> Bounds + Sync) -> Self {
+        let all = (0..count).into_par_iter().map(&bounds_of).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
+        Self::new(step_cost, &all, count, bounds_of)
+    }
+
+    /// A tree where the box of `all` primitives is known.
     pub(super) fn within(all: &Bounds, count: usize, bounds_of: impl Fn(usize) -> Bounds + Sync) -> Self {
+        Self::new(STEP_COST, all, count, bounds_of)
+    }
+
+    fn new(step_cost: f32, all: &Bounds, count: usize, bounds_of: impl Fn(usize) -> Bounds + Sync) -> Self {
         if count == 0 {
             return Self::default();
         }
-        assert!(count < 1 << 31, "primitives are counted in 31 bits");
+        assert!(count < 1 << 29, "primitives are counted in 29 bits: leaves with one of them take four places");
         let (_, exponent) = libm::frexp(all.reach());
         // 2^-1022 … 2^1022: beyond, the boxes lose digits but stay bounds.
         let scale = libm::ldexp(1.0, (-exponent).clamp(-1022, 1022));
@@ -115,16 +156,17 @@ impl Tree {
                 Aabb { min: round_down(b.min * scale), max: round_up(b.max * scale) }
             })
             .collect();
-        let binary = agglomerate(&boxes);
-        let ((mut nodes, depth), order) = match widen(&binary.nodes) {
-            Some(wide) => (wide, binary.primitive_indices),
+        let binary = agglomerate(&boxes, step_cost);
+        let (mut nodes, mut order, depth) = match widen(&binary.nodes, &binary.primitive_indices) {
+            Some(wide) => wide,
             None => {
                 let (binary, order) = halve(&boxes);
-                (widen(&binary).expect("halving 2^31 primitives takes 31 binary levels"), order)
+                widen(&binary, &order).expect("halving 2^31 primitives takes 31 binary levels")
             }
         };
-        // Trees are built once and kept: what the vector grew beyond its end would be kept with them.
+        // Trees are built once and kept: what the vectors grew beyond their ends would be kept with them.
         nodes.shrink_to_fit();
+        order.shrink_to_fit();
         Self { nodes, order, stack: stack_of(depth), scale, bounds: [all.min * scale, all.max * scale] }
     }
 }
@@ -160,11 +202,13 @@ impl Tree {
                 if !(meets(0) && meets(1) && meets(2)) {
                     continue;
                 }
-                let (first, count) = (node.first[lane] as usize, node.count[lane] as usize);
-                if count == 0 {
-                    open.push(first);
-                } else if self.order[first..first + count].iter().any(|&primitive| visit(primitive)) {
-                    return true;
+                match Child::unpack(node.children[lane]) {
+                    Child::Node(node) => open.push(node),
+                    Child::Leaf { first, count } => {
+                        if self.order[first..first + count as usize].iter().any(|&primitive| visit(primitive)) {
+                            return true;
+                        }
+                    }
                 }
             }
         }
@@ -174,7 +218,7 @@ impl Tree {
 
 /// The builder's tree. Its steps are called one by one: the builder's own sequence validates itself in debug builds at a
 /// depth that is too small for degenerate input.
-fn agglomerate(boxes: &[Aabb]) -> Bvh2 {
+fn agglomerate(boxes: &[Aabb], step_cost: f32) -> Bvh2 {
     let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
         PlocSearchDistance::Low,
         boxes,
@@ -184,7 +228,7 @@ fn agglomerate(boxes: &[Aabb]) -> Bvh2 {
     );
     let mut optimizer = ReinsertionOptimizer::default();
     optimizer.run(&mut tree, REINSERTION, None);
-    collapse(&mut tree, LEAF, STEP_COST);
+    collapse(&mut tree, LEAF, step_cost);
     tree
 }
 
@@ -218,10 +262,11 @@ fn halve(boxes: &[Aabb]) -> (Vec<Bvh2Node>, Vec<u32>) {
     (nodes, order)
 }
 
-/// Four-wide nodes from a binary tree, and their levels: each node takes in the largest of its children until it has four.
-/// `None` if the result is deeper than a traversal can hold.
-fn widen(binary: &[Bvh2Node]) -> Option<(Vec<Node>, usize)> {
+/// Four-wide nodes from a binary tree over primitives in `together`, their order leaf after leaf, and the levels: each node takes in
+/// the largest of its children until it has four. `None` if the result is deeper than a traversal can hold.
+fn widen(binary: &[Bvh2Node], together: &[u32]) -> Option<(Vec<Node>, Vec<u32>, usize)> {
     let mut nodes = vec![Node::EMPTY];
+    let mut order: Vec<u32> = Vec::with_capacity(together.len());
     let mut deepest = 1;
     let mut open = vec![(0_u32, 0_usize, 1_usize)];
     while let Some((root, node, depth)) = open.pop() {
@@ -249,16 +294,19 @@ fn widen(binary: &[Bvh2Node]) -> Option<(Vec<Node>, usize)> {
         for (lane, &child) in children[..len].iter().enumerate() {
             let source = &binary[child as usize];
             if source.is_leaf() {
-                nodes[node].set(lane, source.aabb(), source.first_index, source.prim_count);
+                let leaf = &together[source.first_index as usize..][..source.prim_count as usize];
+                nodes[node].set(lane, source.aabb(), Child::Leaf { first: order.len(), count: source.prim_count });
+                order.extend_from_slice(leaf);
+                order.resize(order.len().next_multiple_of(LEAF as usize), leaf[0]);
             } else {
                 let index = nodes.len();
                 nodes.push(Node::EMPTY);
-                nodes[node].set(lane, source.aabb(), index as u32, 0);
+                nodes[node].set(lane, source.aabb(), Child::Node(index));
                 open.push((child, index, depth + 1));
             }
         }
     }
-    Some((nodes, deepest))
+    Some((nodes, order, deepest))
 }
 
 /// The largest f32 vector not above `v`.
@@ -294,12 +342,14 @@ mod tests {
         for (tree, count) in [(nested, 400), (equal, 10_000), (line, 1000)] {
             let mut order = tree.order.clone();
             order.sort_unstable();
+            // What fills leaves is in there a second time.
+            order.dedup();
             assert!(order.into_iter().eq(0..count));
         }
         let boxes = vec![Aabb { min: Vec3A::ZERO, max: Vec3A::ONE }; 1000];
         let (binary, order) = halve(&boxes);
         assert_eq!(order.len(), 1000);
-        assert!(widen(&binary).is_some());
+        assert!(widen(&binary, &order).is_some());
     }
 
     #[test]
