@@ -14,8 +14,8 @@ use abbe::optics::{Dispersion, IorJet};
 use abbe::ray::invariant::InvariantSums;
 use abbe::ray::{
     Column, ColumnSet, Curvature, LambdaColumn, LocalSurface, NoColumns, NormalField, RayStart, ScatterKind,
-    ScreenColumns, SecondOrderColumns, Transfer, critical_distance, direction_derivative, direction_second_derivative,
-    half_width, mirror, refract_or_reflect, screen_motion, second_order_along, standalone,
+    ScreenColumns, SecondOrderColumns, Transfer, critical_distance, deflect, direction_derivative,
+    direction_second_derivative, half_width, mirror, refract_or_reflect, screen_motion, second_order_along, standalone,
 };
 use abbe::spectrum::{REFERENCE, Wavelength, lines};
 use bench::{Bench, Event, Shape, bk7, random, sf66};
@@ -1039,5 +1039,29 @@ fn every_bench_meets_its_events() {
         assert_eq!(trace.events, bench.elements.len(), "{}", bench.name);
         assert!(bench.elements.iter().any(|e| matches!(e.event, Event::Interface { .. })));
         assert!(bench.elements.iter().all(|e| !matches!(e.shape, Shape::Sphere { radius, .. } if radius <= 0.0)));
+    }
+}
+
+#[test]
+fn a_momentum_alone_goes_where_it_goes_with_its_derivatives() {
+    let mut next = random(6);
+    let mut unit = || (DVec3::new(next(), next(), next()) - 0.5).normalize();
+    for i in 0..10_000 {
+        let (direction, n_g, bent) = (unit(), unit(), unit());
+        // From hardly bent to impossible.
+        let n_s = (n_g + bent * f64::from(i % 7) * 0.3).normalize();
+        let field = NormalField::Linear { vector: n_s, gradient: DMat3::from_diagonal(bent) };
+        let curvature = Curvature::Quadric { hessian: DMat3::from_diagonal(n_s) };
+        let surface = LocalSurface { n_g, n_s, curvature, field };
+        let (ior_i, ior_t) = [(1.0, 1.5), (1.5, 1.0), (1.7, 1.7)][i as usize % 3];
+        let momentum = ior_i * direction;
+        let (before, behind) = (IorJet::constant(ior_i), IorJet::constant(ior_t));
+        for (long, ior_t) in [
+            (refract_or_reflect(momentum, &surface, &before, &behind), Some(ior_t)),
+            (mirror(momentum, &surface, &before), None),
+        ] {
+            let short = deflect(momentum, &surface.normals(), ior_i, ior_t);
+            assert_eq!((short.kind, short.momentum), (long.kind, long.momentum_out));
+        }
     }
 }

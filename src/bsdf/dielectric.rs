@@ -20,7 +20,7 @@ use std::f32::consts::FRAC_1_PI;
 use super::albedo::{self, At, Roughness};
 use super::fresnel::{self, Fresnel};
 use super::microfacet::{Ggx, mirror};
-use super::{BsdfSample, Event, Parameters, Scattered, Slices, diffuse, gloss};
+use super::{BsdfSample, Event, Interface, Parameters, Scattered, Slices, diffuse, gloss};
 use crate::spectrum::SampledSpectrum;
 
 /// Indices nearer than this are not refracted by facets: a rough lobe that turns by less than 1e-3 rad, and reflects 2.5e-7, is
@@ -39,6 +39,12 @@ pub(super) struct Dielectric<const N: usize> {
     color: SampledSpectrum<N>,
     tint: SampledSpectrum<N>,
     thin: bool,
+}
+
+/// Whether all lanes have the same.
+#[inline]
+fn is_uniform<const N: usize>(eta: SampledSpectrum<N>) -> bool {
+    eta.0.iter().all(|e| e.to_bits() == eta[0].to_bits())
 }
 
 /// A rough interface.
@@ -82,13 +88,21 @@ impl<const N: usize> Dielectric<N> {
     pub(super) fn new(parameters: &Parameters<N>, eta: SampledSpectrum<N>, weight: f32) -> Self {
         Self {
             weight,
-            uniform: eta.0.iter().all(|e| e.to_bits() == eta[0].to_bits()),
+            uniform: is_uniform(eta),
             fresnel: Fresnel::of_dielectric(parameters, eta),
             eta,
             color: parameters.specular_color,
             tint: parameters.transmission_tint,
             thin: parameters.thin_walled,
         }
+    }
+
+    /// All of a surface between two media.
+    #[inline]
+    pub(super) fn between(interface: &Interface<N>, color: SampledSpectrum<N>, tint: SampledSpectrum<N>) -> Self {
+        let eta = interface.ior_t.zip(interface.ior_i, |t, i| t / i);
+        let uniform = is_uniform(eta);
+        Self { weight: 1.0, uniform, fresnel: Fresnel::of_ratio(eta, uniform), eta, color, tint, thin: false }
     }
 
     /// Whether its indices are too near to each other for facets.

@@ -19,7 +19,11 @@ pub(super) struct OrenNayar {
 }
 
 impl OrenNayar {
+    #[inline]
     pub(super) fn new(roughness: f32) -> Self {
+        if roughness <= 0.0 {
+            return Self { roughness: 0.0, a: 1.0 };
+        }
         let roughness = roughness.clamp(0.0, 1.0);
         Self { roughness, a: 1.0 / (1.0 + (0.5 - 2.0 / (3.0 * PI)) * roughness) }
     }
@@ -79,12 +83,14 @@ pub(super) struct Diffuse<const N: usize> {
 }
 
 impl<const N: usize> Diffuse<N> {
+    #[inline]
     pub(super) fn new(color: SampledSpectrum<N>, roughness: f32) -> Self {
         let shape = OrenNayar::new(roughness);
+        if shape.is_lambert() {
+            return Self { color, shape, multiple: SampledSpectrum::ZERO };
+        }
         let mean = shape.mean_albedo();
-        let multiple =
-            if shape.is_lambert() { SampledSpectrum::ZERO } else { multiple(color, mean) * (FRAC_1_PI / (1.0 - mean)) };
-        Self { color, shape, multiple }
+        Self { color, shape, multiple: multiple(color, mean) * (FRAC_1_PI / (1.0 - mean)) }
     }
 
     /// f cos θ_i; both directions above the surface.

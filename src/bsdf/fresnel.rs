@@ -154,14 +154,16 @@ impl<const N: usize> Fresnel<N> {
         Self { law: Law::Uniform(eta_ti), film: None }
     }
 
+    /// Of a dielectric without a film; `uniform` says whether the ratio of indices is the same in all lanes.
+    #[inline]
+    pub(super) fn of_ratio(ratio: SampledSpectrum<N>, uniform: bool) -> Self {
+        Self { law: if uniform { Law::Uniform(ratio[0]) } else { Law::Dielectric(ratio) }, film: None }
+    }
+
     /// Of the dielectric base; `ratio` has the specular weight in it.
     pub(super) fn of_dielectric(parameters: &Parameters<N>, ratio: SampledSpectrum<N>) -> Self {
-        let law = if ratio.0.iter().all(|eta| eta.to_bits() == ratio[0].to_bits()) {
-            Law::Uniform(ratio[0])
-        } else {
-            Law::Dielectric(ratio)
-        };
-        Self { law, film: FilmStack::new(parameters, ratio, SampledSpectrum::ZERO) }
+        let uniform = ratio.0.iter().all(|eta| eta.to_bits() == ratio[0].to_bits());
+        Self { film: FilmStack::new(parameters, ratio, SampledSpectrum::ZERO), ..Self::of_ratio(ratio, uniform) }
     }
 
     /// Of the dielectric over an opaque base, which a material may state by its F0.

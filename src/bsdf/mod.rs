@@ -137,7 +137,7 @@ impl<const N: usize> Bsdf<N> {
         let has_interface = parameters.specular_weight > 0.0 && !is_matched;
         // Returned from where they are made: moving a BSDF costs more than making a short one.
         if bare && opaque && !has_interface && parameters.diffuse_transmission.is_black() {
-            return Self { kind: Kind::Diffuse(Diffuse::new(parameters.base_color, parameters.diffuse_roughness)) };
+            return Self::diffuse(parameters.base_color, parameters.diffuse_roughness);
         }
         let smooth = parameters.alpha[0].max(parameters.alpha[1]) < SMOOTH_ALPHA;
         if bare && smooth && parameters.metalness >= 1.0 {
@@ -147,6 +147,18 @@ impl<const N: usize> Bsdf<N> {
             return Self { kind: Kind::Clear(Dielectric::new(parameters, stack::ratio(parameters), 1.0)) };
         }
         Self { kind: Kind::Stack(Stack::new(parameters)) }
+    }
+
+    /// Of nothing but diffuse reflection, as [`new`](Self::new) makes it of an albedo and a roughness.
+    #[inline]
+    pub fn diffuse(color: SampledSpectrum<N>, roughness: f32) -> Self {
+        Self { kind: Kind::Diffuse(Diffuse::new(color, roughness)) }
+    }
+
+    /// Of a smooth interface between two media, with the tints of what it reflects and transmits.
+    #[inline]
+    pub fn clear(interface: &Interface<N>, color: SampledSpectrum<N>, tint: SampledSpectrum<N>) -> Self {
+        Self { kind: Kind::Clear(Dielectric::between(interface, color, tint)) }
     }
 
     /// Whether every lobe is smooth: then light sampling has nothing to add.
@@ -167,6 +179,17 @@ impl<const N: usize> Bsdf<N> {
     /// Draws a direction; `None` where the light is absorbed, or `wo` is not above the surface. `u_lobe` chooses the lobe, `u` the
     /// direction.
     pub fn sample(&self, wo: Vec3, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample<N>> {
+        self.sample_lazily(wo, || u_lobe, || u)
+    }
+
+    /// The same, with numbers that are asked for where they are needed.
+    #[inline]
+    pub fn sample_lazily(
+        &self,
+        wo: Vec3,
+        u_lobe: impl FnOnce() -> f32,
+        u: impl FnOnce() -> [f32; 2],
+    ) -> Option<BsdfSample<N>> {
         if wo.z <= 0.0 {
             return None;
         }
@@ -181,10 +204,10 @@ impl<const N: usize> Bsdf<N> {
                     pdf: SampledSpectrum::ONE,
                 });
             }
-            Kind::Clear(facet) => return facet.sample(wo.z, u_lobe, 1.0, [SampledSpectrum::ONE; 2]),
-            Kind::Stack(stack) => return stack.sample(wo, u_lobe, u),
+            Kind::Clear(facet) => return facet.sample(wo.z, u_lobe(), 1.0, [SampledSpectrum::ONE; 2]),
+            Kind::Stack(stack) => return stack.sample(wo, u_lobe(), u()),
         };
-        let wi = sample_cosine(u);
+        let wi = sample_cosine(u());
         let pdf = wi.z * FRAC_1_PI;
         if pdf <= 0.0 || diffuse.color.is_black() {
             return None;

@@ -2,7 +2,7 @@
 
 use super::aov::{self, Aov, Merge};
 use super::spectral::Bins;
-use super::sum::{self, TreeSum};
+use super::sum::{self, TreeSums};
 use super::{Layer, Values};
 use crate::spectrum::{SampledSpectrum, Wavelengths};
 
@@ -32,21 +32,21 @@ pub struct PixelAccumulator {
 
 #[derive(Clone, Debug)]
 enum Slot {
-    Mean { sums: Vec<TreeSum>, valid: u32 },
-    All { sums: Vec<TreeSum> },
+    Mean { sums: TreeSums, valid: u32 },
+    All { sums: TreeSums },
     First { value: Option<u32> },
     Count,
-    Variance { sums: Vec<TreeSum>, squares: Vec<TreeSum> },
+    Variance { sums: TreeSums, squares: TreeSums },
 }
 
 impl Slot {
-    fn trees(&mut self) -> impl Iterator<Item = &mut TreeSum> {
-        let (sums, squares): (&mut [TreeSum], &mut [TreeSum]) = match self {
-            Self::Mean { sums, .. } | Self::All { sums } => (sums, &mut []),
-            Self::Variance { sums, squares } => (sums, squares),
-            Self::First { .. } | Self::Count => (&mut [], &mut []),
+    fn sums(&mut self) -> impl Iterator<Item = &mut TreeSums> {
+        let (sums, squares) = match self {
+            Self::Mean { sums, .. } | Self::All { sums } => (Some(sums), None),
+            Self::Variance { sums, squares } => (Some(sums), Some(squares)),
+            Self::First { .. } | Self::Count => (None, None),
         };
-        sums.iter_mut().chain(squares)
+        sums.into_iter().chain(squares)
     }
 }
 
@@ -58,13 +58,13 @@ impl PixelAccumulator {
             if matches!(aov.name, aov::COLOR | aov::VARIANCE) {
                 color.push(layer);
             }
-            let trees = || vec![TreeSum::new(first_sample); aov.channels.len()];
+            let sums = || TreeSums::new(first_sample, aov.channels.len());
             match aov.merge {
-                Merge::Mean => Slot::Mean { sums: trees(), valid: 0 },
-                Merge::All => Slot::All { sums: trees() },
+                Merge::Mean => Slot::Mean { sums: sums(), valid: 0 },
+                Merge::All => Slot::All { sums: sums() },
                 Merge::First => Slot::First { value: None },
                 Merge::Count => Slot::Count,
-                Merge::Variance => Slot::Variance { sums: trees(), squares: trees() },
+                Merge::Variance => Slot::Variance { sums: sums(), squares: sums() },
             }
         };
         let slots = aovs.into_iter().enumerate().map(slot).collect();
@@ -114,7 +114,7 @@ impl PixelAccumulator {
     pub fn restart(&mut self) {
         self.next_sample = self.first_sample;
         for slot in &mut self.slots {
-            slot.trees().for_each(|sum| sum.restart(self.first_sample));
+            slot.sums().for_each(|sums| sums.restart(self.first_sample));
             match slot {
                 Slot::Mean { valid, .. } => *valid = 0,
                 Slot::First { value } => *value = None,
@@ -137,8 +137,12 @@ impl PixelAccumulator {
             if let Slot::Mean { valid, .. } = slot {
                 *valid = kept.counts[pixel];
             }
-            let sums = &kept.values[pixel * layer.aov.sum_count()..];
-            slot.trees().zip(sums).for_each(|(tree, &sum)| tree.push_range(count, sum));
+            let mut values = &kept.values[pixel * layer.aov.sum_count()..];
+            for sums in slot.sums() {
+                let (of_these, rest) = values.split_at(sums.channels());
+                sums.push_range(count, of_these);
+                values = rest;
+            }
         }
     }
 
@@ -150,13 +154,12 @@ impl PixelAccumulator {
     pub fn relative_error(&self) -> Option<f64> {
         let n = self.sample_count();
         let channels = self.slots.iter().find_map(|slot| match slot {
-            Slot::Variance { sums, squares } => Some(sums.iter().zip(squares)),
+            Slot::Variance { sums, squares } => Some(sums.totals().zip(squares.totals())),
             _ => None,
         })?;
         let (mut variance, mut mean) = (0.0, 0.0);
         for (sum, squares) in channels {
-            let sum = sum.total();
-            variance += sum::variance_of_mean(sum, squares.total(), n) / 3.0;
+            variance += sum::variance_of_mean(sum, squares, n) / 3.0;
             mean += sum.abs() / f64::from(n) / 3.0;
         }
         let value = mean + FLOOR;
@@ -181,14 +184,10 @@ impl PixelAccumulator {
         let value = self.finite(value.map(Into::into));
         match &mut self.slots[layer] {
             Slot::Mean { sums, valid } => {
-                debug_assert_eq!(sums.len(), N, "channels of layer {layer}");
                 *valid += u32::from(value.is_some());
-                push(sums, value);
+                sums.push(&value.unwrap_or([0.0; N]));
             }
-            Slot::All { sums } => {
-                debug_assert_eq!(sums.len(), N, "channels of layer {layer}");
-                push(sums, value);
-            }
+            Slot::All { sums } => sums.push(&value.unwrap_or([0.0; N])),
             _ => panic!("layer {layer} does not hold means"),
         }
     }
@@ -198,13 +197,11 @@ impl PixelAccumulator {
         let Slot::All { sums } = &mut self.slots[layer] else {
             panic!("layer {layer} does not hold light");
         };
-        let mut values = values.into_iter();
-        for sum in sums {
-            let value = values.next().unwrap_or(0.0);
+        sums.push_each(values.into_iter().map(|value| {
             let representable = (value as f32).is_finite();
             self.non_finite += u64::from(!representable);
-            sum.push(if representable { value } else { 0.0 });
-        }
+            if representable { value } else { 0.0 }
+        }));
     }
 
     /// Adds the next sample R, G, B, A of the beauty to every layer that is made of it: `color`, `variance`.
@@ -218,14 +215,14 @@ impl PixelAccumulator {
         if self.color.is_empty() {
             return scale;
         }
-        let value = self.finite(Some([r * scale, g * scale, b * scale, a]));
+        let value = self.finite(Some([r * scale, g * scale, b * scale, a])).unwrap_or_default();
         for &layer in &self.color {
             match &mut self.slots[layer] {
-                Slot::All { sums } => push(sums, value),
+                Slot::All { sums } => sums.push(&value),
                 Slot::Variance { sums, squares } => {
-                    let [r, g, b, _] = value.unwrap_or_default();
-                    push(sums, Some([r, g, b]));
-                    push(squares, Some([r * r, g * g, b * b]));
+                    let [r, g, b, _] = value;
+                    sums.push(&[r, g, b]);
+                    squares.push(&[r * r, g * g, b * b]);
                 }
                 _ => unreachable!("the beauty's layers are these"),
             }
@@ -256,15 +253,16 @@ impl PixelAccumulator {
             let range = |count: usize| pixel * count..(pixel + 1) * count;
             match (slot, &mut layer.values) {
                 (Slot::Mean { sums, valid }, Values::Float(values)) => {
-                    means(sums, *valid, &mut values[range(sums.len())]);
+                    means(sums, *valid, &mut values[range(sums.channels())]);
                     if let Some(fraction) = &mut layer.valid {
                         fraction[pixel] = sum::valid_fraction(*valid, taken);
                     }
                 }
-                (Slot::All { sums }, Values::Float(values)) => means(sums, taken, &mut values[range(sums.len())]),
+                (Slot::All { sums }, Values::Float(values)) => means(sums, taken, &mut values[range(sums.channels())]),
                 (Slot::Variance { sums, squares }, Values::Float(values)) => {
-                    for ((sum, squares), value) in sums.iter().zip(squares).zip(&mut values[range(sums.len())]) {
-                        *value = sum::variance_of_mean(sum.total(), squares.total(), taken) as f32;
+                    let channels = sums.totals().zip(squares.totals());
+                    for ((sum, squares), value) in channels.zip(&mut values[range(sums.channels())]) {
+                        *value = sum::variance_of_mean(sum, squares, taken) as f32;
                     }
                 }
                 (Slot::First { value }, Values::Uint(values)) => values[pixel] = value.unwrap_or(0),
@@ -272,25 +270,21 @@ impl PixelAccumulator {
                 _ => unreachable!("the AOV's sample type follows its merge rule"),
             }
             if let Some(kept) = &mut layer.sums {
-                let (trees, count): (Vec<&TreeSum>, u32) = match slot {
-                    Slot::Mean { sums, valid } => (sums.iter().collect(), *valid),
-                    Slot::All { sums } => (sums.iter().collect(), taken),
-                    Slot::Variance { sums, squares } => (sums.iter().chain(squares).collect(), taken),
+                let (totals, count): (Vec<f64>, u32) = match slot {
+                    Slot::Mean { sums, valid } => (sums.totals().collect(), *valid),
+                    Slot::All { sums } => (sums.totals().collect(), taken),
+                    Slot::Variance { sums, squares } => (sums.totals().chain(squares.totals()).collect(), taken),
                     Slot::First { .. } | Slot::Count => unreachable!("only sums are kept as sums"),
                 };
                 kept.counts[pixel] = count;
-                kept.values[range(trees.len())].iter_mut().zip(trees).for_each(|(kept, sum)| *kept = sum.total());
+                kept.values[range(totals.len())].copy_from_slice(&totals);
             }
         }
     }
 }
 
-fn push<const N: usize>(sums: &mut [TreeSum], value: Option<[f64; N]>) {
-    sums.iter_mut().zip(value.unwrap_or([0.0; N])).for_each(|(sum, v)| sum.push(v));
-}
-
-fn means(sums: &[TreeSum], count: u32, values: &mut [f32]) {
-    sums.iter().zip(values).for_each(|(sum, value)| *value = sum::mean(sum.total(), count));
+fn means(sums: &TreeSums, count: u32, values: &mut [f32]) {
+    sums.totals().zip(values).for_each(|(sum, value)| *value = sum::mean(sum, count));
 }
 
 #[cfg(test)]

@@ -8,10 +8,17 @@
 ///
 /// At most one open node per level is kept, as in a binary counter; an absent sample adds exactly zero.
 #[derive(Clone, Debug)]
-pub struct TreeSum {
+pub struct TreeSum(TreeSums);
+
+/// Sums of as many channels, each of which is a [`TreeSum`]: their trees are one.
+#[derive(Clone, Debug)]
+pub struct TreeSums {
+    channels: usize,
     next: u32,
-    /// Open nodes with their levels, the largest first.
-    open: Vec<(u32, f64)>,
+    /// Levels of the open nodes, the largest first.
+    levels: Vec<u32>,
+    /// What they sum to, channel by channel, node by node.
+    nodes: Vec<f64>,
 }
 
 /// Whether `begin..end` of a render of `total` samples is a whole node of the tree, or its unfinished tail.
@@ -26,57 +33,109 @@ pub fn is_aligned(begin: u32, end: u32, total: u32) -> bool {
 impl TreeSum {
     /// An empty sum whose first sample has index `begin`.
     pub fn new(begin: u32) -> Self {
-        Self { next: begin, open: Vec::with_capacity(8) }
+        Self(TreeSums::new(begin, 1))
     }
 
     /// Starts again at index `begin`, keeping the memory.
     pub fn restart(&mut self, begin: u32) {
-        self.next = begin;
-        self.open.clear();
+        self.0.restart(begin);
     }
 
     /// Adds the sample with the next index.
     #[inline]
     pub fn push(&mut self, value: f64) {
-        if self.next & 1 == 0 {
-            // It closes nothing.
-            self.next += 1;
-            self.open.push((0, value));
-        } else {
-            self.push_node(0, value);
-        }
+        self.0.push(&[value]);
     }
 
     /// Adds a whole part: the finished sum over the next `count` indices, an aligned range.
     pub fn push_range(&mut self, count: u32, sum: f64) {
-        self.push_node(count.next_power_of_two().trailing_zeros(), sum);
-    }
-
-    fn push_node(&mut self, level: u32, value: f64) {
-        let (mut level, mut value) = (level, value);
-        let index = self.next >> level;
-        let mut k = index;
-        self.next = (index + 1) << level;
-        // An odd node closes its parent: add it to the open sibling on its left.
-        while k & 1 == 1 {
-            match self.open.last() {
-                Some(&(open_level, left)) if open_level == level => {
-                    value += left;
-                    self.open.pop();
-                    level += 1;
-                    k >>= 1;
-                }
-                _ => break,
-            }
-        }
-        self.open.push((level, value));
+        self.0.push_range(count, &[sum]);
     }
 
     /// The sum: open nodes are added from the smallest to the largest.
     pub fn total(&self) -> f64 {
-        let mut nodes = self.open.iter().rev();
-        let first = nodes.next().map_or(0.0, |&(_, value)| value);
-        nodes.fold(first, |sum, &(_, value)| value + sum)
+        self.0.total(0)
+    }
+}
+
+impl TreeSums {
+    /// Empty sums whose first sample has index `begin`.
+    pub fn new(begin: u32, channels: usize) -> Self {
+        Self { channels, next: begin, levels: Vec::with_capacity(8), nodes: Vec::with_capacity(8 * channels) }
+    }
+
+    /// How many there are.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// As [`TreeSum::restart`].
+    pub fn restart(&mut self, begin: u32) {
+        self.next = begin;
+        self.levels.clear();
+        self.nodes.clear();
+    }
+
+    /// As [`TreeSum::push`], one value for each channel.
+    #[inline]
+    pub fn push(&mut self, values: &[f64]) {
+        debug_assert_eq!(values.len(), self.channels, "a value for each channel");
+        self.nodes.extend_from_slice(values);
+        self.close_leaf();
+    }
+
+    /// The same where the channels come one by one; what is missing is 0.
+    pub fn push_each(&mut self, values: impl IntoIterator<Item = f64>) {
+        self.nodes.extend(values.into_iter().chain(std::iter::repeat(0.0)).take(self.channels));
+        self.close_leaf();
+    }
+
+    #[inline]
+    fn close_leaf(&mut self) {
+        if self.next & 1 == 0 {
+            // It closes nothing.
+            self.next += 1;
+            self.levels.push(0);
+        } else {
+            self.close(0);
+        }
+    }
+
+    /// As [`TreeSum::push_range`].
+    pub fn push_range(&mut self, count: u32, sums: &[f64]) {
+        debug_assert_eq!(sums.len(), self.channels, "a sum for each channel");
+        self.nodes.extend_from_slice(sums);
+        self.close(count.next_power_of_two().trailing_zeros());
+    }
+
+    /// The last of the nodes is new, and of this level.
+    fn close(&mut self, mut level: u32) {
+        let index = self.next >> level;
+        let mut k = index;
+        self.next = (index + 1) << level;
+        // An odd node closes its parent: add it to the open sibling on its left.
+        while k & 1 == 1 && self.levels.last() == Some(&level) {
+            let last = self.nodes.len() - self.channels;
+            let (rest, values) = self.nodes.split_at_mut(last);
+            rest[last - self.channels..].iter_mut().zip(values).for_each(|(left, value)| *left += *value);
+            self.nodes.truncate(last);
+            self.levels.pop();
+            level += 1;
+            k >>= 1;
+        }
+        self.levels.push(level);
+    }
+
+    /// As [`TreeSum::total`], of one channel.
+    pub fn total(&self, channel: usize) -> f64 {
+        let mut nodes = self.nodes.iter().skip(channel).step_by(self.channels).rev();
+        let first = nodes.next().copied().unwrap_or_default();
+        nodes.fold(first, |sum, &value| value + sum)
+    }
+
+    /// All of them, channel by channel.
+    pub fn totals(&self) -> impl Iterator<Item = f64> {
+        (0..self.channels).map(|channel| self.total(channel))
     }
 }
 

@@ -15,7 +15,7 @@ use super::placed::{Frame, Placed, bounds_under, is_invertible, largest_reach};
 use super::start::{UNIT_ROUNDOFF, behind};
 use super::tree::{Bounds, Tree};
 use super::{Departures, Hit, Instance, InstanceArray, Location, Numbering, Ray, Shape};
-use crate::ray::LocalSurface;
+use crate::ray::{LocalSurface, UnitNormals};
 
 /// Everything that rays can meet.
 #[derive(Debug)]
@@ -435,6 +435,14 @@ impl Aggregate {
             return Placed { shape, frame, time: ray.time }.local_surface(ray, hit);
         }
         self.with(hit.instance, ray.time, |placed| placed.local_surface(ray, hit)).expect("it was met at this time")
+    }
+
+    /// The same point, and the surface as far as a ray without derivatives needs it.
+    pub fn normals(&self, ray: &Ray, hit: &Hit) -> (DVec3, UnitNormals) {
+        if let Some((shape, Standing::Still(frame))) = self.singles.get(hit.instance as usize) {
+            return Placed { shape, frame, time: ray.time }.normals(ray, hit);
+        }
+        self.with(hit.instance, ray.time, |placed| placed.normals(ray, hit)).expect("it was met at this time")
     }
 
     /// Texture coordinates at a hit; `None` where none are authored (always, for analytic shapes). `_point`, the refined hit

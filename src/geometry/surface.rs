@@ -7,10 +7,27 @@ use super::placed::Placed;
 use super::solid::{Bend, Solid};
 use super::sphere::Sphere;
 use super::{Hit, Ray, Shape};
-use crate::ray::{Curvature, LocalSurface, NormalField};
+use crate::ray::{Curvature, LocalSurface, NormalField, UnitNormals};
 
 /// Below this share of the corner normals an interpolated one is nothing but their f32 rounding: sixteen of its steps.
 const VANISHING: f64 = 16.0 / 16_777_216.0;
+
+/// A triangle at a hit.
+struct Facet {
+    /// In object space.
+    corners: [DVec3; 3],
+    point: DVec3,
+    n_g: DVec3,
+    /// What its corners' normals say, if they say something.
+    smooth: Option<Interpolated>,
+}
+
+/// Corner normals, interpolated.
+struct Interpolated {
+    vector: DVec3,
+    /// Its derivatives by the weights of the second and the third corner.
+    along: [DVec3; 2],
+}
 
 impl Placed<'_> {
     pub(super) fn local_surface(&self, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
@@ -21,24 +38,50 @@ impl Placed<'_> {
         }
     }
 
+    /// The point of [`local_surface`](Self::local_surface) and the normals alone, bit by bit.
+    #[inline]
+    pub(super) fn normals(&self, ray: &Ray, hit: &Hit) -> (DVec3, UnitNormals) {
+        match self.shape {
+            Shape::Mesh(mesh) => {
+                let Facet { point, n_g, smooth, .. } = self.facet_at(mesh, hit);
+                (point, UnitNormals { n_g, n_s: smooth.map_or(n_g, |smooth| smooth.vector.normalize()) })
+            }
+            Shape::Sphere(sphere) => {
+                let (_, point, n_g) = self.ball_at(*sphere, ray, hit);
+                (point, UnitNormals { n_g, n_s: n_g })
+            }
+            Shape::Solid(solid) => {
+                let (point, surface) = self.piece(solid, ray, hit);
+                (point, surface.normals())
+            }
+        }
+    }
+
     /// The point is the combination of corners, which lies in the plane to rounding however far the ray came.
-    fn facet(&self, mesh: &Mesh, hit: &Hit) -> (DVec3, LocalSurface) {
+    #[inline(always)]
+    fn facet_at(&self, mesh: &Mesh, hit: &Hit) -> Facet {
         let corners = mesh.corners(hit.primitive, self.time);
         let [a, b, c] = corners.map(|p| self.point(p));
         let [v, w] = hit.barycentric;
         let point = (1.0 - v - w) * a + v * b + w * c;
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let n_g = self.covector(normal).normalize();
+        let smooth = mesh.normals(hit.primitive, self.time).and_then(|normals| {
+            let [s0, s1, s2] = normals.map(|n| self.covector(n));
+            let along = [s1 - s0, s2 - s0];
+            let vector = s0 + v * along[0] + w * along[1];
+            let largest = s0.length().max(s1.length()).max(s2.length());
+            let is_normal = vector.length() > VANISHING * largest && vector.dot(n_g) > 0.0;
+            is_normal.then_some(Interpolated { vector, along })
+        });
+        Facet { corners, point, n_g, smooth }
+    }
+
+    fn facet(&self, mesh: &Mesh, hit: &Hit) -> (DVec3, LocalSurface) {
+        let Facet { corners, point, n_g, smooth } = self.facet_at(mesh, hit);
         // Written where it is returned: it is long.
         let surface = |n_s, field| (point, LocalSurface { n_g, n_s, curvature: Curvature::Plane, field });
-        let Some(normals) = mesh.normals(hit.primitive, self.time) else { return surface(n_g, NormalField::Flat) };
-        let [s0, s1, s2] = normals.map(|n| self.covector(n));
-        let (d1, d2) = (s1 - s0, s2 - s0);
-        let vector = s0 + v * d1 + w * d2;
-        let largest = s0.length().max(s1.length()).max(s2.length());
-        if vector.length() <= VANISHING * largest || vector.dot(n_g) <= 0.0 {
-            return surface(n_g, NormalField::Flat);
-        }
+        let Some(Interpolated { vector, along: [d1, d2] }) = smooth else { return surface(n_g, NormalField::Flat) };
         let n_s = vector.normalize();
         if d1 == DVec3::ZERO && d2 == DVec3::ZERO {
             return surface(n_s, NormalField::Flat);
@@ -59,11 +102,16 @@ impl Placed<'_> {
         mesh.tangents(hit.primitive, [self.linear * (b - a), self.linear * (c - a)])
     }
 
-    fn ellipsoid(&self, sphere: Sphere, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
+    /// The point in object space and in render space, and the normal there.
+    #[inline(always)]
+    fn ball_at(&self, sphere: Sphere, ray: &Ray, hit: &Hit) -> (DVec3, DVec3, DVec3) {
         let object = self.ray(ray);
         let p = sphere.project(object.origin + hit.distance * object.stretch * object.direction);
-        let point = self.point(p);
-        let n_g = self.covector(p).normalize();
+        (p, self.point(p), self.covector(p).normalize())
+    }
+
+    fn ellipsoid(&self, sphere: Sphere, ray: &Ray, hit: &Hit) -> (DVec3, LocalSurface) {
+        let (p, point, n_g) = self.ball_at(sphere, ray, hit);
         let surface = match self.similarity {
             Some(scale) => {
                 let inv_radius = 1.0 / (scale * sphere.radius());

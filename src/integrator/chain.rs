@@ -181,7 +181,7 @@ impl<'a> Follower<'a> {
     pub fn first_surface(&self, start: &RayStart, counters: &mut Counters) -> Option<SurfacePoint> {
         let mut walk = Walk::new(self, start);
         loop {
-            let met = walk.advance(counters)?;
+            let met: SurfacePoint = walk.advance(counters)?;
             if met.presence != Presence::Absent {
                 return Some(met);
             }
@@ -222,7 +222,7 @@ impl<'a> Follower<'a> {
         let columns_carried = u64::from(C::LAMBDA) + 2 * u64::from(C::SCREEN) + u64::from(C::SECOND);
         let mut momentum = medium.ior * start.direction;
         loop {
-            let met = walk.advance(counters);
+            let met: Option<SurfacePoint> = walk.advance(counters);
             if std::mem::take(&mut walk.begins_anew) {
                 medium = media.of(walk.media.current());
                 momentum = medium.ior * start.direction;

@@ -121,7 +121,7 @@ impl<'a> BruteForce<'a> {
         let (mut radiance, mut throughput, mut vertices, mut squeezed) = (0.0, 1.0, 0, 1.0);
         let mut last: Option<LastEvent> = None;
         loop {
-            let met = walk.advance(&mut self.counters);
+            let met: Option<SurfacePoint> = walk.advance(&mut self.counters);
             let ray = walk.ray;
             let medium = self.media.of(walk.media.current());
             let through = |distance: f64| medium.transmittance(distance).map_or(1.0, |t| t.hero());
@@ -166,7 +166,8 @@ impl<'a> BruteForce<'a> {
             if lighting.replaces_material(&met.hit) {
                 return (radiance, 1.0);
             }
-            let (normal, tangent) = surface::normal_and_tangent(task.view, &ray, &met, &at);
+            let (normal, tangent) =
+                surface::normal_and_tangent(task.view, &ray, &met.hit, &met.surface.normals(), at.directed());
             let facing = |n: DVec3| if ray.direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
             let n_g = facing(met.surface.n_g);
             let n_s = Some(facing(normal)).filter(|n| ray.direction.dot(*n) < 0.0).unwrap_or(n_g);

@@ -2,31 +2,26 @@
 
 use glam::DVec3;
 
-use super::walk::SurfacePoint;
-use crate::bsdf::Parameters;
 use crate::geometry::{Hit, Ray};
+use crate::ray::UnitNormals;
 use crate::sampler::PathSampler;
 use crate::scene::material::SurfaceAt;
 use crate::scene::view::View;
 use crate::spectrum::SampledSpectrum;
 
-/// Shading normal of the surface that a ray met, on the outside as authored, and the tangent along which it is anisotropic.
+/// Shading normal of the surface that a ray met, on the outside as authored, and the tangent along which it is anisotropic; `at` has
+/// the say in them if it is [directed](SurfaceAt::directed).
+#[inline]
 pub(super) fn normal_and_tangent<const N: usize>(
     view: &View<'_>,
     ray: &Ray,
-    met: &SurfacePoint,
-    at: &SurfaceAt<N>,
+    hit: &Hit,
+    normals: &UnitNormals,
+    at: Option<&SurfaceAt<N>>,
 ) -> (DVec3, Option<DVec3>) {
-    if !at.has_direction() {
-        return (met.surface.n_s, None);
-    }
-    let frame = view.shading_frame(&met.hit, ray.time, &met.surface, at);
+    let Some(at) = at else { return (normals.n_s, None) };
+    let frame = view.shading_frame(hit, ray.time, normals, at);
     (frame.normal, Some(frame.tangent))
-}
-
-/// Whether light comes from behind.
-pub(super) fn transmits<const N: usize>(parameters: &Parameters<N>) -> bool {
-    parameters.transmission > 0.0 || !parameters.diffuse_transmission.is_black()
 }
 
 /// Tells the crossings of one straight way apart: a ray enters and leaves a sphere by the same primitive.

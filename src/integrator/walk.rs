@@ -7,9 +7,9 @@ use glam::DVec3;
 
 use super::chain::{Counters, Follower};
 use crate::camera::Sight;
-use crate::geometry::{Departures, Hit, Ray};
+use crate::geometry::{Aggregate, Departures, Hit, Ray};
 use crate::optics::media::{Inside, MediaStack, MediumId};
-use crate::ray::{LocalSurface, RayStart};
+use crate::ray::{LocalSurface, RayStart, UnitNormals};
 use crate::scene::view::{Presence, View};
 
 /// Straight crossings (cut-outs, surfaces inside a medium of higher priority) that one chain may make.
@@ -18,15 +18,35 @@ pub(super) const MAX_CROSSINGS: u32 = 4096;
 /// Coincident surfaces that are taken together; more are met one by one.
 const MAX_COINCIDENT: u32 = 8;
 
+/// How much a ray has to know of the surfaces that it meets.
+pub(super) trait Extent: Copy {
+    /// The point of a hit, and the surface around it.
+    fn around(aggregate: &Aggregate, ray: &Ray, hit: &Hit) -> (DVec3, Self);
+}
+
+impl Extent for LocalSurface {
+    #[inline]
+    fn around(aggregate: &Aggregate, ray: &Ray, hit: &Hit) -> (DVec3, Self) {
+        aggregate.local_surface(ray, hit)
+    }
+}
+
+impl Extent for UnitNormals {
+    #[inline]
+    fn around(aggregate: &Aggregate, ray: &Ray, hit: &Hit) -> (DVec3, Self) {
+        aggregate.normals(ray, hit)
+    }
+}
+
 /// A point on a surface, as a ray met it.
 #[derive(Clone, Copy, Debug)]
-pub struct SurfacePoint {
+pub struct SurfacePoint<S = LocalSurface> {
     /// Which surface, and where on it.
     pub hit: Hit,
     /// Render space.
     pub point: DVec3,
     /// The surface about the point.
-    pub surface: LocalSurface,
+    pub surface: S,
     /// 1-based, 0 for none.
     pub material_id: u32,
     /// What it is there.
@@ -86,11 +106,11 @@ impl<'a> Walk<'a> {
     }
 
     /// The next surface that is seen.
-    pub(super) fn advance(&mut self, counters: &mut Counters) -> Option<SurfacePoint> {
+    pub(super) fn advance<S: Extent>(&mut self, counters: &mut Counters) -> Option<SurfacePoint<S>> {
         loop {
             counters.rays += 1;
             let hit = self.view.intersect(&self.ray, &self.departures)?;
-            let (point, surface) = self.view.aggregate.local_surface(&self.ray, &hit);
+            let (point, surface) = S::around(&self.view.aggregate, &self.ray, &hit);
             self.travelled += hit.distance;
             let material_id = self.view.material_id(&hit);
             let is_seen = match self.sight {
@@ -114,7 +134,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Goes straight on through a surface that the camera does not see, into the media behind it.
-    fn overlook(&mut self, met: &SurfacePoint, counters: &mut Counters) {
+    fn overlook<S>(&mut self, met: &SurfacePoint<S>, counters: &mut Counters) {
         counters.unseen += 1;
         match self.view.inside(&met.hit, met.material_id) {
             Some(inside) if met.hit.leaving => counters.unmatched_exits += u64::from(!self.media.leave(&inside)),
@@ -127,11 +147,15 @@ impl<'a> Walk<'a> {
 
     /// Puts what is seen from inside of a glass in the place of `met`, its surface: an opaque surface or a mirror that coincides with
     /// it, if there is one. Without this, rounding would decide for each ray whether glass that stands on a table touches it.
-    pub(super) fn in_contact(&self, met: &mut SurfacePoint, counters: &mut Counters) {
+    #[inline]
+    pub(super) fn in_contact<S: Extent>(&self, met: &mut SurfacePoint<S>, counters: &mut Counters) {
         let bounds_glass = |hit: &Hit, id: u32| self.view.inside(hit, id).is_some();
-        if !met.hit.leaving || !self.view.is_in_contact(&met.hit) || !bounds_glass(&met.hit, met.material_id) {
-            return;
+        if met.hit.leaving && self.view.is_in_contact(&met.hit) && bounds_glass(&met.hit, met.material_id) {
+            self.look_for_backing(met, counters);
         }
+    }
+
+    fn look_for_backing<S: Extent>(&self, met: &mut SurfacePoint<S>, counters: &mut Counters) {
         let ahead = Ray { origin: met.point, ..self.ray };
         let mut departures = self.departures;
         departures.depart(&self.ray, &met.hit, true);
@@ -141,7 +165,7 @@ impl<'a> Walk<'a> {
             let material_id = self.view.material_id(&hit);
             let presence = self.view.presence(&hit, material_id);
             if self.view.is_backing(material_id) && presence != Presence::Absent {
-                let (point, surface) = self.view.aggregate.local_surface(&ahead, &hit);
+                let (point, surface) = S::around(&self.view.aggregate, &ahead, &hit);
                 // Met where the glass was, by the ray that met the glass.
                 let hit = Hit { distance: met.hit.distance, at_start: met.hit.at_start, ..hit };
                 *met = SurfacePoint { hit, point, surface, material_id, presence };
@@ -152,7 +176,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Goes straight on through the surface.
-    pub(super) fn cross(&mut self, met: &SurfacePoint) {
+    pub(super) fn cross<S>(&mut self, met: &SurfacePoint<S>) {
         self.crossings += 1;
         self.departures.depart(&self.ray, &met.hit, met.hit.leaving);
         self.ray.origin = met.point;
@@ -160,7 +184,7 @@ impl<'a> Walk<'a> {
 
     /// Goes on from the surface in a new direction, a unit vector. Whatever goes to the far side has [passed](Self::pass)
     /// already.
-    pub(super) fn turn(&mut self, met: &SurfacePoint, direction: DVec3, has_passed: bool) {
+    pub(super) fn turn<S>(&mut self, met: &SurfacePoint<S>, direction: DVec3, has_passed: bool) {
         if !has_passed {
             self.departures.depart(&self.ray, &met.hit, !met.hit.leaving);
         }
@@ -170,21 +194,27 @@ impl<'a> Walk<'a> {
 
     /// What lies behind the surface, together with all glass that coincides with it: two cemented faces are one interface
     /// between their media, in whatever order rounding presents them.
-    pub(super) fn far_side(&self, met: &SurfacePoint, counters: &mut Counters) -> FarSide {
+    #[inline]
+    pub(super) fn far_side<S>(&self, met: &SurfacePoint<S>, counters: &mut Counters) -> FarSide {
         let inside = self.view.inside(&met.hit, met.material_id);
-        if !self.view.is_touching(&met.hit) {
-            // Nothing coincides: the stack is asked, not copied.
-            let medium = match inside {
-                Some(inside) if met.hit.leaving => self.media.preview_leave(&inside).unwrap_or_else(|_| {
-                    counters.unmatched_exits += 1;
-                    self.media.current()
-                }),
-                Some(inside) => self.media.preview_enter(&inside),
-                None => self.media.current(),
-            };
-            return FarSide { medium, inside, cluster: None };
+        if self.view.is_touching(&met.hit) {
+            return self.behind_all(met, inside, counters);
         }
-        let mut cluster = Cluster { media: self.media.clone(), departures: self.departures };
+        // Nothing coincides: the stack is asked, not copied.
+        let medium = match inside {
+            Some(inside) if met.hit.leaving => self.media.preview_leave(&inside).unwrap_or_else(|_| {
+                counters.unmatched_exits += 1;
+                self.media.current()
+            }),
+            Some(inside) => self.media.preview_enter(&inside),
+            None => self.media.current(),
+        };
+        FarSide { medium, inside, cluster: None }
+    }
+
+    /// What lies behind a surface and all that may coincide with it.
+    fn behind_all<S>(&self, met: &SurfacePoint<S>, inside: Option<Inside>, counters: &mut Counters) -> FarSide {
+        let mut cluster = Box::new(Cluster { media: self.media.clone(), departures: self.departures });
         let mut is_alone = true;
         self.include(&mut cluster, &met.hit, inside, counters);
         let ahead = Ray { origin: met.point, ..self.ray };
@@ -216,15 +246,21 @@ impl<'a> Walk<'a> {
         }
     }
 
+    /// Goes to the far side, or straight on where nothing is bounded.
+    #[inline]
+    pub(super) fn go_behind<S>(&mut self, met: &SurfacePoint<S>, far: Option<FarSide>) {
+        match far {
+            Some(far) => self.pass(met, far),
+            None => self.cross(met),
+        }
+    }
+
     /// Goes to the far side; the direction is the caller's.
-    pub(super) fn pass(&mut self, met: &SurfacePoint, far: FarSide) {
+    pub(super) fn pass<S>(&mut self, met: &SurfacePoint<S>, far: FarSide) {
         self.crossings += 1;
         self.ray.origin = met.point;
         match (far.cluster, far.inside) {
-            (Some(cluster), _) => {
-                self.media = cluster.media;
-                self.departures = cluster.departures;
-            }
+            (Some(cluster), _) => (self.media, self.departures) = (cluster.media, cluster.departures),
             (None, inside) => {
                 self.departures.depart(&self.ray, &met.hit, met.hit.leaving);
                 match inside {
@@ -244,7 +280,7 @@ pub(super) struct FarSide {
     /// What the surface that was met bounds.
     inside: Option<Inside>,
     /// Where several surfaces coincide: the state behind all of them.
-    cluster: Option<Cluster>,
+    cluster: Option<Box<Cluster>>,
 }
 
 /// The state of a walk behind coincident surfaces.

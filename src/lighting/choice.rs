@@ -179,14 +179,19 @@ impl Choice {
         (1.0 - EVEN) * importance / sum + EVEN / count
     }
 
-    /// The emitter of a light and the probability with which it is chosen; `u` in 0..1.
-    pub(super) fn sample(&self, chooser: &Chooser, is_linked: impl Fn(u32) -> bool, u: f64) -> Option<(u32, f64)> {
+    /// The emitter of a light and the probability with which it is chosen; `u`, in 0..1, is asked for where there is a choice.
+    pub(super) fn sample(
+        &self,
+        chooser: &Chooser,
+        is_linked: impl Fn(u32) -> bool,
+        u: impl FnOnce() -> f64,
+    ) -> Option<(u32, f64)> {
         // Nothing to compare it with: no importance is needed.
         if let Some(Set { illuminates, tree, .. }) = self.lone_tree() {
             let is_possible = illuminates.is_none_or(&is_linked) && tree.may_reach(chooser.point, chooser.normal);
             return if is_possible { tree.sample(chooser.point, chooser.normal, u) } else { None };
         }
-        let total = self.total(chooser, &is_linked);
+        let (u, total) = (u(), self.total(chooser, &is_linked));
         let mut up_to = 0.0;
         let mut chosen = None;
         self.each(chooser, &is_linked, |candidate, importance| {
@@ -203,7 +208,7 @@ impl Choice {
             Candidate::Tree(set) => {
                 let rest = rest.clamp(0.0, 1.0 - f64::EPSILON);
                 let (emitter, probability) =
-                    self.sets[set as usize].tree.sample(chooser.point, chooser.normal, rest)?;
+                    self.sets[set as usize].tree.sample(chooser.point, chooser.normal, || rest)?;
                 Some((emitter, share * probability))
             }
         }

@@ -78,7 +78,8 @@ impl Color {
         self.white(wavelengths) * filter.at(wavelengths)
     }
 
+    #[inline]
     fn white<const N: usize>(&self, wavelengths: &Wavelengths<N>) -> SampledSpectrum<N> {
-        SampledSpectrum(wavelengths.nanometers().map(|nm| self.white.at(nm)))
+        SampledSpectrum::from_fn(|lane| self.white.at(wavelengths.nanometers()[lane]))
     }
 }

@@ -165,7 +165,7 @@ impl<'a> Portals<'a> {
             }
         }
         let (portal, u) = last?;
-        Some(portal.sample(p, [u, v])?.wi)
+        Some(portal.sample_by_angle(p, [u, v])?.wi)
     }
 
     /// As often over the total as there are portals in that direction.

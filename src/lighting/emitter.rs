@@ -198,6 +198,7 @@ impl Placed {
     }
 
     /// Distance at which a ray meets the side that shines, and where on a rectangle.
+    #[inline]
     pub(super) fn meet(&self, origin: DVec3, direction: DVec3) -> Option<(f64, [f64; 2])> {
         match &self.form {
             Form::Rectangle { shape, .. } => shape.meet(origin, direction),

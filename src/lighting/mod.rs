@@ -284,9 +284,20 @@ impl<'a> Lighting<'a> {
         u_light: f32,
         u: [f32; 2],
     ) -> Option<LightSample<N>> {
+        self.sample_where_chosen(receiver, wavelengths, || u_light, u)
+    }
+
+    /// The same; `u_light` is not asked for where there is but one light.
+    pub fn sample_where_chosen<const N: usize>(
+        &self,
+        receiver: &Receiver,
+        wavelengths: &Wavelengths<N>,
+        u_light: impl FnOnce() -> f32,
+        u: [f32; 2],
+    ) -> Option<LightSample<N>> {
         let chooser = chooser(receiver);
         let is_linked = |set| self.view.scene.is_linked(set, receiver.object);
-        let (number, probability) = self.choice.sample(&chooser, is_linked, refined(u_light, u))?;
+        let (number, probability) = self.choice.sample(&chooser, is_linked, || refined(u_light(), u))?;
         let (p, u) = (receiver.point, u.map(f64::from));
         let light = match self.emitters[number as usize] {
             Emitter::Piece { object, primitive } => {
@@ -454,6 +465,7 @@ impl<'a> Lighting<'a> {
 
     /// Calls `f` with every light that is not geometry and that the ray meets before `limit`, in the order of the lights.
     /// They block nothing, so that all of them count.
+    #[inline]
     pub fn along<const N: usize>(
         &self,
         ray: &Ray,
@@ -461,20 +473,21 @@ impl<'a> Lighting<'a> {
         wavelengths: &Wavelengths<N>,
         f: &mut dyn FnMut(LightHit<N>),
     ) {
-        let mut meet = |number: u32| {
-            if let Some(placed) = &self.placed[number as usize]
-                && let Some((distance, at)) = placed.meet(ray.origin, ray.direction)
-                && distance < limit
-            {
-                let radiance = self.radiance(number as usize, placed, ray.direction, at, wavelengths);
-                let point = ray.origin + distance * ray.direction;
-                f(LightHit { light: LightId(number), distance, radiance, emitter: EmitterId(number), point });
-            }
-        };
-        let Some(tree) = &self.tree else {
-            self.visible.iter().for_each(|&number| meet(number));
-            return;
-        };
+        match &self.tree {
+            None => self.visible.iter().for_each(|&number| self.meet(number, ray, limit, wavelengths, f)),
+            Some(tree) => self.along_many(tree, ray, limit, wavelengths, f),
+        }
+    }
+
+    /// The same by a tree.
+    fn along_many<const N: usize>(
+        &self,
+        tree: &Tree,
+        ray: &Ray,
+        limit: f64,
+        wavelengths: &Wavelengths<N>,
+        f: &mut dyn FnMut(LightHit<N>),
+    ) {
         // The order of a walk is the tree's, and that is the builder's threads'.
         let mut near = Vec::new();
         tree.walk(ray.origin, ray.direction, 0.0, limit, SPREAD, |i, limit| {
@@ -482,7 +495,27 @@ impl<'a> Lighting<'a> {
             limit
         });
         near.sort_unstable();
-        near.into_iter().for_each(meet);
+        near.into_iter().for_each(|number| self.meet(number, ray, limit, wavelengths, f));
+    }
+
+    /// Calls `f` with a light that is not geometry if the ray meets it before `limit`.
+    #[inline]
+    fn meet<const N: usize>(
+        &self,
+        number: u32,
+        ray: &Ray,
+        limit: f64,
+        wavelengths: &Wavelengths<N>,
+        f: &mut dyn FnMut(LightHit<N>),
+    ) {
+        if let Some(placed) = &self.placed[number as usize]
+            && let Some((distance, at)) = placed.meet(ray.origin, ray.direction)
+            && distance < limit
+        {
+            let radiance = self.radiance(number as usize, placed, ray.direction, at, wavelengths);
+            let point = ray.origin + distance * ray.direction;
+            f(LightHit { light: LightId(number), distance, radiance, emitter: EmitterId(number), point });
+        }
     }
 
     /// What shines from infinitely far along the ray: every dome and distant light.

@@ -140,9 +140,13 @@ impl LightTree {
         self.nodes.first().is_some_and(|root| normal.is_none_or(|normal| root.is_above(p, normal)))
     }
 
-    /// A light and the probability with which it is chosen; `u` in 0..1.
-    pub(super) fn sample(&self, p: DVec3, normal: Option<DVec3>, mut u: f64) -> Option<(u32, f64)> {
-        let (mut index, mut probability) = (0, 1.0);
+    /// A light and the probability with which it is chosen; `u`, in 0..1, is asked for where there is more than one.
+    pub(super) fn sample(&self, p: DVec3, normal: Option<DVec3>, u: impl FnOnce() -> f64) -> Option<(u32, f64)> {
+        let root = self.nodes.first()?;
+        if root.is_leaf {
+            return Some((root.next, 1.0));
+        }
+        let (mut index, mut probability, mut u) = (0, 1.0, u());
         loop {
             let node = self.nodes.get(index)?;
             if node.is_leaf {

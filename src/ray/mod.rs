@@ -34,7 +34,7 @@ pub use column::{
     direction_second_derivative,
 };
 pub use footprint::{critical_distance, half_width};
-pub use scatter::{ScatterKind, Scattering, mirror, refract_or_reflect};
+pub use scatter::{Deflected, ScatterKind, Scattering, deflect, mirror, refract_or_reflect};
 pub use second_order::{SecondOrder, Step, second_order_along};
-pub use surface::{Curvature, LocalSurface, NormalField};
+pub use surface::{Curvature, LocalSurface, NormalField, UnitNormals};
 pub use transfer::Transfer;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::column::Column;
-use super::surface::{LocalSurface, NormalField, Normals};
+use super::surface::{Curvature, LocalSurface, NormalField, Normals, UnitNormals};
 use crate::math::compensated::w_squared;
 use crate::optics::IorJet;
 
@@ -94,6 +94,29 @@ pub fn mirror(momentum: DVec3, surface: &LocalSurface, ior_i: &IorJet) -> Scatte
         let g = momentum.dot(normal);
         reflection(ScatterKind::Mirror, momentum, normal, field, g, g * g, ior_i, ior_i)
     })
+}
+
+/// A momentum after an event, for whom nothing of its derivatives is needed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deflected {
+    /// What happened.
+    pub kind: ScatterKind,
+    /// K after.
+    pub momentum: DVec3,
+}
+
+/// What [`refract_or_reflect`] says of the momentum, bit by bit; without `ior_t` what [`mirror`] says.
+#[inline]
+pub fn deflect(momentum: DVec3, normals: &UnitNormals, ior_i: f64, ior_t: Option<f64>) -> Deflected {
+    // Neither enters the momentum.
+    let (curvature, field) = (Curvature::Plane, NormalField::Flat);
+    let surface = LocalSurface { n_g: normals.n_g, n_s: normals.n_s, curvature, field };
+    let ior_i = IorJet::constant(ior_i);
+    let scattering = match ior_t {
+        Some(ior_t) => refract_or_reflect(momentum, &surface, &ior_i, &IorJet::constant(ior_t)),
+        None => mirror(momentum, &surface, &ior_i),
+    };
+    Deflected { kind: scattering.kind, momentum: scattering.momentum_out }
 }
 
 /// Applies `event` with the shading normal, or with the geometric normal where that one is impossible.

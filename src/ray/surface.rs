@@ -107,6 +107,22 @@ pub struct LocalSurface {
     pub field: NormalField,
 }
 
+impl LocalSurface {
+    /// Its normals alone.
+    pub fn normals(&self) -> UnitNormals {
+        UnitNormals { n_g: self.n_g, n_s: self.n_s }
+    }
+}
+
+/// A surface as far as a ray needs it that carries no derivatives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitNormals {
+    /// As [`LocalSurface::n_g`].
+    pub n_g: DVec3,
+    /// As [`LocalSurface::n_s`].
+    pub n_s: DVec3,
+}
+
 /// The derivatives of a unit normal at a point that moves. Types rather than an enum, so that the kind is decided once
 /// per event and not once per column.
 pub(super) trait Normals {

@@ -116,6 +116,7 @@ impl PathSampler {
     }
 
     /// The place of the hero wavelength, 0..1: stratified over the pixel's samples.
+    #[inline]
     pub fn wavelength(&self) -> f64 {
         self.point.dimension(WAVELENGTH).into()
     }
@@ -123,16 +124,19 @@ impl PathSampler {
     /// Four numbers in 0..1, the next of the path.
     #[inline]
     pub fn draw(&mut self) -> [f32; 4] {
+        let four = self.four();
+        std::array::from_fn(|i| four.at(i))
+    }
+
+    /// The same where not all of them may be needed.
+    #[inline]
+    pub fn four(&mut self) -> Four {
         let group = self.group;
         self.group += 1;
-        if group < GROUPS {
-            return self.point.dimensions(group);
-        }
-        let mut state = hash(self.pixel_seed ^ (u64::from(self.index) << 32 | u64::from(group)));
-        std::array::from_fn(|_| {
-            state = hash(state);
-            // 24 bits fill the mantissa: never 1.
-            (state >> 40) as f32 * (1.0 / 16_777_216.0)
+        Four(if group < GROUPS {
+            Drawn::Stratified { sobol_rev: self.point.sobol_rev(group), point: self.point, group }
+        } else {
+            Drawn::Independent(hash(self.pixel_seed ^ (u64::from(self.index) << 32 | u64::from(group))))
         })
     }
 
@@ -143,8 +147,30 @@ impl PathSampler {
 
     /// A number in 0..1 for something that has a number of its own on the way: independent of all others.
     pub fn of(&self, what: u64) -> f32 {
-        let state = hash(self.pixel_seed ^ hash(what ^ (u64::from(self.index) << 32 | u64::from(self.group))));
-        (state >> 40) as f32 * (1.0 / 16_777_216.0)
+        unit(hash(self.pixel_seed ^ hash(what ^ (u64::from(self.index) << 32 | u64::from(self.group)))))
+    }
+}
+
+/// Four numbers in 0..1 that a path has drawn, each computed when it is asked for: scrambling them is most of the work.
+#[derive(Clone, Copy, Debug)]
+pub struct Four(Drawn);
+
+#[derive(Clone, Copy, Debug)]
+enum Drawn {
+    /// Of the sequence, not scrambled yet.
+    Stratified { sobol_rev: [u32; 4], point: Point, group: u32 },
+    /// Beyond it: what their hashes begin with.
+    Independent(u64),
+}
+
+impl Four {
+    /// The number `i` of the four.
+    #[inline]
+    pub fn at(&self, i: usize) -> f32 {
+        match self.0 {
+            Drawn::Stratified { sobol_rev, point, group } => point.scrambled(sobol_rev[i], group, i),
+            Drawn::Independent(state) => unit((0..=i).fold(state, |state, _| hash(state))),
+        }
     }
 }
 
@@ -219,12 +245,17 @@ impl Sampler {
     /// One sample stands at the centre of everything; more follow an Owen-scrambled Sobol' sequence (Burley 2020), scrambled
     /// per pixel.
     pub fn sample(&self, pixel: [i32; 2], index: u32) -> CameraSample {
+        self.start(pixel, &self.path(pixel, index))
+    }
+
+    /// The sample of `pixel` with which the path of these `numbers`, none of which it has drawn yet, begins.
+    #[inline]
+    pub fn start(&self, pixel: [i32; 2], numbers: &PathSampler) -> CameraSample {
         let [x, y] = pixel.map(f64::from);
         if self.samples == 1 {
             return CameraSample::at(x + 0.5, y + 0.5);
         }
-        let (index, seed) = in_block(index, self.pixel_seed(pixel));
-        let point = Point::new(index, seed);
+        let point = numbers.point;
         let [dx, dy, u, v] = point.dimensions(0).map(f64::from);
         let time = if self.over_time { point.dimension(TIME).into() } else { 0.5 };
         let raster = match &self.filter {
@@ -236,6 +267,12 @@ impl Sampler {
         };
         CameraSample { raster, lens: [u, v], time }
     }
+}
+
+/// The first bits of `x` as a number in 0..1: 24 fill the mantissa, so that it is never 1.
+#[inline]
+fn unit(x: u64) -> f32 {
+    (x >> 40) as f32 * (1.0 / 16_777_216.0)
 }
 
 /// Mixes all bits of `x` (finaliser of SplitMix64; Steele, Lea, Flood 2014).

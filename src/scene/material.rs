@@ -33,8 +33,8 @@ use network::Networks;
 use painter::Painter;
 pub(in crate::scene) use resources::{Resources, source};
 pub use shading_frame::ShadingFrame;
+pub use surface::{Finish, Surface, SurfaceAt};
 use surface::{IndexOf, Measured};
-pub use surface::{Surface, SurfaceAt};
 use values::Values;
 
 /// From this weight on a surface counts as what the weight says: transmissive, metallic, present.

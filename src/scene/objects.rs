@@ -186,6 +186,15 @@ impl Objects {
         }
     }
 
+    /// The materials of the object `index`, one a slot: what rays ask of every surface that they meet.
+    #[inline]
+    pub fn material_ids(&self, index: u32) -> &[u32] {
+        match self.singles.get(index as usize) {
+            Some(object) => &object.material_ids,
+            None => self.ids(index).material_ids,
+        }
+    }
+
     /// Every combination of shape and identifiers once: (shape, prim_id, materials).
     pub fn kinds(&self) -> impl Iterator<Item = (&Shape, u32, &[u32])> {
         let singles = self.singles.iter().map(|o| (&*o.shape, o.prim_id, &*o.material_ids));

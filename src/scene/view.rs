@@ -5,13 +5,13 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use glam::DVec3;
 
 use super::Scene;
-use super::material::{Below, Kind, Material, ShadingFrame, Surface, SurfaceAt};
+use super::material::{Below, Finish, Kind, Material, ShadingFrame, Surface, SurfaceAt};
 use crate::bsdf::Interface;
 use crate::error::{Error, Result};
 use crate::geometry::{Aggregate, Departures, Hit, Ray};
 use crate::optics::IorJet;
 use crate::optics::media::{Inside, MediaStack, MediumId};
-use crate::ray::LocalSurface;
+use crate::ray::UnitNormals;
 use crate::spectrum::{Wavelength, Wavelengths};
 use crate::texture::Program;
 
@@ -143,11 +143,13 @@ impl<'a> View<'a> {
     }
 
     /// `material_id` at `hit`, 0 for none.
+    #[inline]
     pub fn material_id(&self, hit: &Hit) -> u32 {
-        let ids = self.scene.objects.ids(hit.instance).material_ids;
+        let ids = self.scene.objects.material_ids(hit.instance);
         ids[self.slot(hit, ids) as usize]
     }
 
+    #[inline]
     fn slot(&self, hit: &Hit, ids: &[u32]) -> u32 {
         // One material, one slot: no lookup of the face.
         if ids.len() == 1 { 0 } else { self.aggregate.slot(hit) }
@@ -175,6 +177,7 @@ impl<'a> View<'a> {
     }
 
     /// Whether the surface at `hit`, whose material is `id`, is as its material says, something else, or not there.
+    #[inline]
     pub fn presence(&self, hit: &Hit, id: u32) -> Presence {
         let Some(index) = id.checked_sub(1) else { return Presence::AsStated };
         let material = &self.scene.materials[index as usize];
@@ -207,21 +210,35 @@ impl<'a> View<'a> {
         self.with_results(surface, hit, |results| surface.at(results, wavelengths, interface))
     }
 
+    /// The same as far as light has to know it, which of most surfaces is little.
+    #[inline]
+    pub fn finish<const N: usize>(
+        &self,
+        hit: &Hit,
+        id: u32,
+        wavelengths: &Wavelengths<N>,
+        interface: Interface<N>,
+    ) -> Finish<N> {
+        let other = || self.surface(hit, id, wavelengths, interface);
+        self.surface_of(id).finish(wavelengths, interface, other)
+    }
+
     /// The frame of what [`surface`](Self::surface) said of `hit`, met at `time`: its normal after the normal map, on the side of
     /// the geometric normal, and its tangent along u, turned as the material says.
     pub fn shading_frame<const N: usize>(
         &self,
         hit: &Hit,
         time: f64,
-        local: &LocalSurface,
+        normals: &UnitNormals,
         at: &SurfaceAt<N>,
     ) -> ShadingFrame {
         let authored = if at.has_direction() { self.aggregate.tangents(hit, time) } else { None };
-        ShadingFrame::new(local, authored, at.normal_map, at.rotation)
+        ShadingFrame::new(normals, authored, at.normal_map, at.rotation)
     }
 
     /// The share of the surface at `hit` that is there, 0..=1: 1 − this goes straight on, as if nothing were met. The same as
     /// [`SurfaceAt::presence`], for rays that only ask what is in their way.
+    #[inline]
     pub fn share_present(&self, hit: &Hit, id: u32) -> f32 {
         let surface = self.surface_of(id);
         if surface.is_present() { 1.0 } else { self.with_results(surface, hit, |results| surface.presence(results)) }
@@ -232,6 +249,7 @@ impl<'a> View<'a> {
         self.surface_of(id).is_rough()
     }
 
+    #[inline]
     fn surface_of(&self, id: u32) -> &'a Surface {
         match id.checked_sub(1) {
             Some(index) => &self.scene.materials[index as usize].surface,

@@ -112,11 +112,13 @@ impl Visible {
     /// Wavelengths for the hero's place `u` in 0..1.
     #[inline]
     pub fn sample<const N: usize>(&self, u: f64) -> Wavelengths<N> {
-        let drawn: [(f64, f64); N] = std::array::from_fn(|lane| {
+        let mut drawn = Wavelengths { nanometers: [0.0; N], pdf_lambda: [0.0; N] };
+        for lane in 0..N {
             let place = u + lane as f64 / N as f64;
-            self.density.inverse(if place >= 1.0 { place - 1.0 } else { place })
-        });
-        Wavelengths { nanometers: drawn.map(|(nm, _)| nm), pdf_lambda: drawn.map(|(_, pdf)| pdf as f32) }
+            let (nanometers, pdf) = self.density.inverse(if place >= 1.0 { place - 1.0 } else { place });
+            (drawn.nanometers[lane], drawn.pdf_lambda[lane]) = (nanometers, pdf as f32);
+        }
+        drawn
     }
 }
 

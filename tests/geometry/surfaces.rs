@@ -18,6 +18,7 @@ fn skew() -> DAffine3 {
 fn surface_at(scene: &Aggregate, r: &Ray) -> (DVec3, LocalSurface) {
     let hit = first(scene, r).expect("a hit");
     let (point, surface) = scene.local_surface(r, &hit);
+    assert_eq!(scene.normals(r, &hit), (point, surface.normals()), "the short answer is part of the long one");
     assert!((point - r.origin - hit.distance * r.direction).length() < 1e-13 * (1.0 + point.length()));
     assert!((surface.n_g.length() - 1.0).abs() < 1e-15 * 4.0 && (surface.n_s.length() - 1.0).abs() < 1e-15 * 4.0);
     assert_eq!(surface.n_g.dot(r.direction) > 0.0, hit.leaving);

@@ -20,11 +20,11 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         walk: &Walk<'a>,
         surface: &Scatterer<'_, N>,
         state: &State<N>,
-        u_look: f32,
+        u_look: impl FnOnce() -> f32,
         numbers: &PathSampler,
     ) {
         let Some(Look { count, .. }) = surface.look else { return };
-        let count = (count + u_look) as u32;
+        let count = (count + u_look()) as u32;
         let mut numbers = *numbers;
         for index in 0..count {
             numbers = numbers.branch();

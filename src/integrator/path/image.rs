@@ -10,10 +10,11 @@ use glam::{DMat4, DVec2, DVec3, DVec4, Vec3, Vec4};
 
 use super::state::Way;
 use crate::geometry::Ray;
-use crate::integrator::walk::SurfacePoint;
 use crate::lighting::Patch;
 use crate::optics::IorJet;
-use crate::ray::{ColumnSet, Curvature, RayStart, Scattering, ScreenColumns, Transfer};
+use crate::ray::{
+    ColumnSet, Curvature, LocalSurface, RayStart, Scattering, ScreenColumns, Transfer, mirror, refract_or_reflect,
+};
 
 /// The columns of a photon on its way: by its place on the light, and by its direction there.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +23,8 @@ pub(super) struct Trail {
     by_direction: ScreenColumns,
     /// Of the photon on the patch.
     place: DVec2,
+    /// Where it has come to.
+    surface: Option<LocalSurface>,
 }
 
 /// The image that a photon has seen, where it arrived.
@@ -64,12 +67,23 @@ impl Trail {
         } else {
             (start(patch.half, nowhere), start(nowhere, across))
         };
-        Some(Self { by_place, by_direction, place })
+        Some(Self { by_place, by_direction, place, surface: None })
     }
 
     /// Goes on to a surface.
-    pub(super) fn transfer(&mut self, ray: &Ray, met: &SurfacePoint, ior: f64) {
-        self.transfer_to(met.hit.distance, ray.direction, met.surface.n_g, met.surface.curvature, ior);
+    pub(super) fn transfer(&mut self, ray: &Ray, distance: f64, surface: LocalSurface, ior: f64) {
+        self.transfer_to(distance, ray.direction, surface.n_g, surface.curvature, ior);
+        self.surface = Some(surface);
+    }
+
+    /// Refracted at the surface that it has come to, or reflected, into the index `ior_t`; mirrored if that is `None`.
+    pub(super) fn turn(&mut self, direction: DVec3, ior_i: f64, ior_t: Option<f64>) {
+        let Some(surface) = self.surface else { return };
+        let (momentum, ior_i) = (ior_i * direction, IorJet::constant(ior_i));
+        self.scatter(&match ior_t {
+            Some(ior_t) => refract_or_reflect(momentum, &surface, &ior_i, &IorJet::constant(ior_t)),
+            None => mirror(momentum, &surface, &ior_i),
+        });
     }
 
     pub(super) fn transfer_to(&mut self, distance: f64, direction: DVec3, n_g: DVec3, curvature: Curvature, ior: f64) {
@@ -212,7 +226,7 @@ impl ImageLobes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ray::{LocalSurface, NormalField, refract_or_reflect};
+    use crate::ray::NormalField;
 
     const IOR: f64 = 1.5;
 

@@ -200,11 +200,11 @@ impl<const N: usize, const DISPERSIVE: bool> Worker for PathWorker<'_, N, DISPER
     fn render(&mut self, pixel: [i32; 2], range: Range<u32>, out: &mut PixelAccumulator) {
         let task = self.prepared.task;
         for index in range {
-            let place = task.sampler.sample(pixel, index);
+            let numbers = task.sampler.path(pixel, index);
+            let place = task.sampler.start(pixel, &numbers);
             if let Some(others) = &mut self.others {
                 others.sample(&place, out);
             }
-            let numbers = task.sampler.path(pixel, index);
             let wavelengths = self.prepared.visible.sample::<N>(numbers.wavelength());
             let start = task.camera.ray(&place);
             let color = |radiance| -> [f64; 3] {

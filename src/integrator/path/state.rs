@@ -11,8 +11,11 @@ use crate::integrator::frame::Frame;
 use crate::integrator::walk::SurfacePoint;
 use crate::lighting::Receiver;
 use crate::optics::media::MediumId;
-use crate::ray::Scattering;
+use crate::ray::UnitNormals;
 use crate::spectrum::{SampledSpectrum, Wavelengths};
+
+/// A surface as a path meets it.
+pub(super) type Met = SurfacePoint<UnitNormals>;
 
 /// What a path is followed for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -202,13 +205,6 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// The ray is refracted or reflected.
-    pub(super) fn turn(&mut self, scattering: &Scattering) {
-        if let Some(trail) = &mut self.trail {
-            trail.scatter(scattering);
-        }
-    }
-
     /// No companion goes where the hero goes.
     pub(super) fn leave_companions(&mut self) {
         for lane in 1..N {
@@ -222,7 +218,7 @@ impl<const N: usize> State<N> {
 
 /// A surface that scatters, where the path has met it.
 pub(super) struct Scatterer<'s, const N: usize> {
-    pub(super) met: &'s SurfacePoint,
+    pub(super) met: &'s Met,
     /// Geometric normal on the side of the path.
     pub(super) n_g: DVec3,
     pub(super) frame: Frame,

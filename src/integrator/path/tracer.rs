@@ -13,20 +13,21 @@ use super::guide::Guide;
 use super::image::Trail;
 use super::ledger::Ledger;
 use super::plate::Plate;
-use super::state::{Arrival, Look, Purpose, Scatterer, State, Vertex, Way};
-use crate::bsdf::{self, Bsdf, Interface, Scattered};
+use super::state::{Arrival, Look, Met, Purpose, Scatterer, State, Vertex, Way};
+use crate::bsdf::{self, Interface, Scattered};
 use crate::camera::Camera;
 use crate::geometry::Ray;
 use crate::integrator::chain::{Counters, Follower};
 use crate::integrator::frame::Frame;
-use crate::integrator::lanes::{Laws, PathMedia};
+use crate::integrator::lanes::{Laws, Medium, PathMedia};
 use crate::integrator::light_path::{self, Event, Expression};
 use crate::integrator::surface;
-use crate::integrator::walk::{MAX_CROSSINGS, SurfacePoint, Walk};
+use crate::integrator::walk::{MAX_CROSSINGS, Walk};
 use crate::light::Shape;
 use crate::lighting::{LightHit, LightId, Lighting, Receiver};
-use crate::ray::{RayStart, ScatterKind, mirror, refract_or_reflect};
-use crate::sampler::PathSampler;
+use crate::ray::{Deflected, RayStart, ScatterKind, deflect};
+use crate::sampler::{Four, PathSampler};
+use crate::scene::material::Finish;
 use crate::scene::view::View;
 use crate::spectrum::{SampledSpectrum, Wavelengths, visible};
 
@@ -101,25 +102,18 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
 
     /// Follows a walk to its end.
     pub(super) fn follow(&mut self, walk: &mut Walk<'a>, state: &mut State<N>, numbers: &mut PathSampler) {
-        let Setting { lighting, .. } = self.setting;
         loop {
-            let mut met = walk.advance(&mut self.counters);
+            let mut met: Option<Met> = walk.advance(&mut self.counters);
             let limit = met.as_ref().map_or(f64::INFINITY, |met| met.hit.distance);
             let medium = self.media.of(walk.media.current());
-            let ray = walk.ray;
             if state.meets_lights() {
-                lighting.along(&ray, limit, &state.wavelengths, &mut |mut light| {
-                    if let Some(through) = medium.transmittance(light.distance) {
-                        light.radiance *= through;
-                    }
-                    self.meet(state, ray.direction, &light);
-                });
+                self.meet_along(&walk.ray, limit, &medium, state);
             }
             let Some(met) = &mut met else {
                 // What absorbs lets nothing through from infinitely far.
                 let absorbs = |sigma: &SampledSpectrum<N>| sigma.0.iter().any(|&sigma| sigma > 0.0);
                 if state.meets_lights() && !medium.absorption.as_ref().is_some_and(absorbs) {
-                    self.leave(state, &ray);
+                    self.leave(state, &walk.ray);
                 }
                 break;
             };
@@ -132,12 +126,23 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
                 break;
             }
             if let Some(trail) = &mut state.trail {
-                trail.transfer(&walk.ray, met, medium.ior);
+                let (_, surface) = self.setting.view.aggregate.local_surface(&walk.ray, &met.hit);
+                trail.transfer(&walk.ray, met.hit.distance, surface, medium.ior);
             }
-            if !self.event(walk, met, state, numbers) {
+            if !self.event(walk, met, &medium, state, numbers) {
                 break;
             }
         }
+    }
+
+    /// Adds the lights that are no geometry and that the path's ray meets before `limit`.
+    fn meet_along(&mut self, ray: &Ray, limit: f64, medium: &Medium<N>, state: &State<N>) {
+        self.setting.lighting.along(ray, limit, &state.wavelengths, &mut |mut light| {
+            if let Some(through) = medium.transmittance(light.distance) {
+                light.radiance *= through;
+            }
+            self.meet(state, ray.direction, &light);
+        });
     }
 
     /// The path meets nothing more.
@@ -223,11 +228,12 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
     fn event(
         &mut self,
         walk: &mut Walk<'a>,
-        met: &SurfacePoint,
+        met: &Met,
+        medium: &Medium<N>,
         state: &mut State<N>,
         numbers: &mut PathSampler,
     ) -> bool {
-        let Setting { view, lighting, limits, guide, .. } = self.setting;
+        let Setting { view, lighting, .. } = self.setting;
         let inside = view.inside(&met.hit, met.material_id);
         if state.purpose != Purpose::Picture
             && inside.is_none()
@@ -237,23 +243,79 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
             self.arrive(walk, met, state);
             return false;
         }
-        let medium = self.media.of(walk.media.current());
         // What lies behind: another medium only where the surface bounds one.
-        let mut far = inside.map(|_| walk.far_side(met, &mut self.counters));
-        let far_medium = far.as_ref().map_or(medium, |far| self.media.of(far.medium));
+        let far = inside.map(|_| walk.far_side(met, &mut self.counters));
+        let far_medium = match &far {
+            Some(far) => self.media.of(far.medium),
+            None => *medium,
+        };
         let interface = Interface { ior_i: medium.iors, ior_t: far_medium.iors };
-        let at = view.surface(&met.hit, met.material_id, &state.wavelengths, interface);
-        let is_there = at.presence >= 1.0 || numbers.of(surface::crossing(&met.hit)) < at.presence;
+        let finish = view.finish(&met.hit, met.material_id, &state.wavelengths, interface);
+        let presence = finish.presence();
+        let is_there = presence >= 1.0 || numbers.of(surface::crossing(&met.hit)) < presence;
         if !is_there {
             walk.cross(met);
             return true;
         }
-        if let Some(far) = far.take_if(|far| far.medium == walk.media.current()) {
+        if far.as_ref().is_some_and(|far| far.medium == walk.media.current()) {
             // The same medium on both sides: no optics. But shadow rays know nothing of media.
             state.is_cut_off = true;
-            walk.pass(met, far);
+            walk.go_behind(met, far);
             return true;
         }
+        if !self.see(walk, met, state) {
+            return false;
+        }
+        // Moving it would take longer than what most surfaces need of it.
+        let bsdf = &finish.bsdf();
+        let (frame, n_g) = frame(view, &walk.ray, met, &finish);
+        let mut surface = Scatterer {
+            met,
+            n_g,
+            frame,
+            wo: frame.to_local(-walk.ray.direction),
+            bsdf,
+            receiver: Receiver {
+                point: met.point,
+                normal: (!finish.transmits()).then(|| n_g.as_vec3()),
+                object: met.hit.instance,
+                time: walk.ray.time,
+            },
+            far: far.as_ref().map(|far| far.medium),
+            look: None,
+        };
+        if !bsdf.is_smooth() && !lighting.is_empty() {
+            match state.purpose {
+                Purpose::Focused => return false,
+                Purpose::Photon => {
+                    state.arrive::<DISPERSIVE>(met.point, &walk.ray, medium.ior);
+                    return false;
+                }
+                Purpose::Picture => self.gather(walk, &mut surface, state, numbers),
+            }
+        }
+        if state.purpose != Purpose::Picture && state.smooth_events == MOST_SMOOTH {
+            return false;
+        }
+        let four = numbers.four();
+        let Some(turn) = self.scatter(walk, &surface, [medium, &far_medium], state, &four) else { return false };
+        if turn.passes {
+            if far.is_some() {
+                let ratio = (far_medium.ior / medium.ior) as f32;
+                state.squeezed *= ratio * ratio;
+            }
+            // Through a wall straight on: what lies behind is not of this surface.
+            walk.go_behind(met, if turn.is_straight { None } else { far });
+        }
+        if !turn.is_straight {
+            walk.turn(met, turn.direction, turn.passes);
+        }
+        self.survives(state, || four.at(3))
+    }
+
+    /// The path meets a surface that is there, with what it emits; whether it scatters.
+    fn see(&mut self, walk: &Walk<'a>, met: &Met, state: &mut State<N>) -> bool {
+        let Setting { view, lighting, .. } = self.setting;
         if state.sees_through && view.scene.objects.ids(met.hit.instance).appearance.matte {
             state.open::<DISPERSIVE>();
             return false;
@@ -261,188 +323,146 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         if state.depth.total() == 0 {
             state.alpha = 1.0;
         }
-        let direction = walk.ray.direction;
-        if state.meets_lights()
-            && let Some(emitted) = lighting.emitted(&walk.ray, &met.hit, &state.wavelengths)
-        {
-            self.meet(state, direction, &emitted);
-        }
-        if lighting.replaces_material(&met.hit) {
-            return false;
-        }
+        self.meet_emission(walk, met, state);
         state.object = Some(met.hit.instance);
-        // The shading normal decides how light is scattered, the geometric one which side it is on.
-        let (normal, tangent) = surface::normal_and_tangent(view, &walk.ray, met, &at);
-        let toward = |n: DVec3| if direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
-        let n_g = toward(met.surface.n_g);
-        let mut normal = toward(normal);
-        if direction.dot(normal) >= 0.0 {
-            normal = n_g;
+        !lighting.replaces_material(&met.hit)
+    }
+
+    /// Adds what the surface emits.
+    fn meet_emission(&mut self, walk: &Walk<'a>, met: &Met, state: &State<N>) {
+        if state.meets_lights()
+            && let Some(emitted) = self.setting.lighting.emitted(&walk.ray, &met.hit, &state.wavelengths)
+        {
+            self.meet(state, walk.ray.direction, &emitted);
         }
-        let frame = match tangent {
-            Some(tangent) => Frame::along(normal, tangent),
-            None => Frame::about(normal),
-        };
-        // Moving it would take longer than what most surfaces need of it.
-        let bsdf = &Bsdf::new(&at.parameters);
-        let mut surface = Scatterer {
-            met,
-            n_g,
-            frame,
-            wo: frame.to_local(-direction),
-            bsdf,
-            receiver: Receiver {
-                point: met.point,
-                normal: (!surface::transmits(&at.parameters)).then(|| n_g.as_vec3()),
-                object: met.hit.instance,
-                time: walk.ray.time,
-            },
-            far: far.as_ref().map(|far| far.medium),
-            look: None,
-        };
-        if !surface.bsdf.is_smooth() && !lighting.is_empty() {
-            match state.purpose {
-                Purpose::Focused => return false,
-                Purpose::Photon => {
-                    state.arrive::<DISPERSIVE>(met.point, &walk.ray, medium.ior);
-                    return false;
-                }
-                Purpose::Picture => {
-                    let [u_light, u, v, u_look] = numbers.draw();
-                    if let Some(light) = lighting.sample(&surface.receiver, &state.wavelengths, u_light, [u, v]) {
-                        self.add_direct(walk, &surface, &light, state, numbers);
-                    }
-                    surface.look = guide.and_then(|guide| {
-                        let region = guide.region(met.point)?;
-                        let weight = state.carried::<DISPERSIVE>().mean();
-                        Some(Look { region, count: guide.count(region, weight) })
-                    });
-                    self.add_focused(walk, &surface, state, u_look, numbers);
-                }
-            }
+    }
+
+    /// Adds what the surface scatters of light that is looked for: at a sampled point of a light, and by way of smooth surfaces.
+    fn gather(&mut self, walk: &Walk<'a>, surface: &mut Scatterer<'_, N>, state: &State<N>, numbers: &mut PathSampler) {
+        let Setting { lighting, guide, .. } = self.setting;
+        let four = numbers.four();
+        let (u_light, u) = (|| four.at(0), [four.at(1), four.at(2)]);
+        if let Some(light) = lighting.sample_where_chosen(&surface.receiver, &state.wavelengths, u_light, u) {
+            self.add_direct(walk, surface, &light, state, numbers);
         }
-        if state.purpose != Purpose::Picture && state.smooth_events == MOST_SMOOTH {
-            return false;
-        }
-        let [mut u_lobe, u, v, u_roulette] = numbers.draw();
+        let Some(guide) = guide else { return };
+        surface.look = guide.region(surface.met.point).map(|region| {
+            let weight = state.carried::<DISPERSIVE>().mean();
+            Look { region, count: guide.count(region, weight) }
+        });
+        self.add_focused(walk, surface, state, || four.at(3), numbers);
+    }
+
+    /// Draws what becomes of the path between the `media` of both sides; `None` where it ends.
+    fn scatter(
+        &mut self,
+        walk: &Walk<'a>,
+        surface: &Scatterer<'_, N>,
+        [medium, far_medium]: [&Medium<N>; 2],
+        state: &mut State<N>,
+        four: &Four,
+    ) -> Option<Turn> {
         let is_clear = surface.bsdf.is_clear();
         let wanted = match state.wanted.map(|way| way.at(state.smooth_events)) {
-            Some(None) => return false,
+            Some(None) => return None,
             wanted => wanted.flatten(),
         };
-        if let Some(passes) = wanted.filter(|_| is_clear) {
-            u_lobe = f32::from(u8::from(passes));
-        }
-        let explores = state.purpose == Purpose::Photon && u_roulette < 2.0 * EXPLORED;
-        if explores {
-            u_lobe = if u_roulette < EXPLORED { 0.0 } else { 1.0 - f32::EPSILON };
-        }
-        let Some(sample) = surface.bsdf.sample(surface.wo, u_lobe, [u, v]) else { return false };
+        let u_lobe = || match state.purpose {
+            Purpose::Focused if is_clear && wanted.is_some() => f32::from(u8::from(wanted == Some(true))),
+            Purpose::Photon if four.at(3) < EXPLORED => 0.0,
+            Purpose::Photon if four.at(3) < 2.0 * EXPLORED => 1.0 - f32::EPSILON,
+            _ => four.at(0),
+        };
+        let sample = surface.bsdf.sample_lazily(surface.wo, u_lobe, || [four.at(1), four.at(2)])?;
         if state.purpose == Purpose::Photon && sample.pdf.hero() < 1.0 {
             let probability = sample.pdf.hero();
             state.throughput *= probability / ((1.0 - 2.0 * EXPLORED) * probability + EXPLORED);
         }
         if wanted.is_some_and(|passes| passes == (sample.scattered == Scattered::Mirror)) {
-            return false;
+            return None;
         }
         if is_clear {
             state.chosen *= sample.pdf.hero();
         }
         state.depth = state.depth.after(sample.event);
-        if !state.depth.is_within(&limits) {
-            return false;
-        }
-        // A look ends at a surface with other lobes: nothing but this way leads on from its smooth one.
-        if !surface.bsdf.is_smooth() && !matches!(sample.scattered, Scattered::Toward(_)) {
-            state.vertex = None;
+        if !state.depth.is_within(&self.setting.limits) {
+            return None;
         }
         let before = state.r;
         state.throughput *= sample.weight;
-        let (turned, passes) = match sample.scattered {
-            Scattered::Toward(wi) => {
-                let turned = frame.to_world(wi);
-                let passes = turned.dot(n_g) < 0.0;
-                if passes != (wi.z < 0.0) {
-                    return false;
-                }
-                let hero = sample.pdf.hero();
-                if DISPERSIVE {
-                    state.r *= sample.pdf * (1.0 / hero);
-                }
-                state.vertex = Some(Vertex {
-                    receiver: surface.receiver,
-                    r_over_pdf: before * (1.0 / hero),
-                    diffuse_share: sample.diffuse.safe_div(sample.weight),
-                    look: surface.look.filter(|_| !passes),
-                    direction: turned,
-                });
-                (state.smooth_events, state.is_cut_off) = (0, false);
-                (state.way, state.chosen) = (Way::START, 1.0);
-                if state.first.is_none() {
-                    state.first = Some(state.worth::<DISPERSIVE>());
-                }
-                (turned, passes)
+        let normals = &surface.met.surface;
+        let direction = walk.ray.direction;
+        let (turned, passes) = if let Scattered::Toward(wi) = sample.scattered {
+            let turned = surface.frame.to_world(wi);
+            let passes = turned.dot(surface.n_g) < 0.0;
+            if passes != (wi.z < 0.0) {
+                return None;
             }
-            Scattered::Mirror => {
-                state.pass_smoothly(false);
-                let ior = medium.jet();
-                let scattering = mirror(ior.ior * direction, &met.surface, &ior);
-                state.turn(&scattering);
-                ((scattering.momentum_out / ior.ior).normalize(), false)
+            let hero = sample.pdf.hero();
+            if DISPERSIVE {
+                state.r *= sample.pdf * (1.0 / hero);
             }
-            Scattered::Refract => {
-                state.pass_smoothly(true);
-                let (ior_i, ior_t) = (medium.jet(), far_medium.jet());
-                let scattering = refract_or_reflect(ior_i.ior * direction, &met.surface, &ior_i, &ior_t);
-                state.turn(&scattering);
-                if DISPERSIVE && (medium.is_dispersive || far_medium.is_dispersive) {
-                    state.leave_companions();
+            state.vertex = Some(Vertex {
+                receiver: surface.receiver,
+                r_over_pdf: before * (1.0 / hero),
+                diffuse_share: sample.diffuse.safe_div(sample.weight),
+                look: surface.look.filter(|_| !passes),
+                direction: turned,
+            });
+            (state.smooth_events, state.is_cut_off) = (0, false);
+            (state.way, state.chosen) = (Way::START, 1.0);
+            if state.first.is_none() {
+                state.first = Some(state.worth::<DISPERSIVE>());
+            }
+            (turned, passes)
+        } else {
+            // A look ends at a surface with other lobes: nothing but this way leads on from its smooth one.
+            if !surface.bsdf.is_smooth() {
+                state.vertex = None;
+            }
+            state.pass_smoothly(sample.scattered != Scattered::Mirror);
+            match sample.scattered {
+                Scattered::Toward(_) | Scattered::Straight => (direction, true),
+                Scattered::Mirror => {
+                    if let Some(trail) = &mut state.trail {
+                        trail.turn(direction, medium.ior, None);
+                    }
+                    let Deflected { momentum, .. } = deflect(medium.ior * direction, normals, medium.ior, None);
+                    ((momentum / medium.ior).normalize(), false)
                 }
-                // f32 has let pass what f64 reflects: at the last digit before the critical angle.
-                let passes = scattering.kind == ScatterKind::Refraction;
-                let ior = if passes { ior_t.ior } else { ior_i.ior };
-                ((scattering.momentum_out / ior).normalize(), passes)
-            }
-            Scattered::Straight => {
-                state.pass_smoothly(true);
-                (direction, true)
+                Scattered::Refract => {
+                    if let Some(trail) = &mut state.trail {
+                        trail.turn(direction, medium.ior, Some(far_medium.ior));
+                    }
+                    let Deflected { momentum, kind } =
+                        deflect(medium.ior * direction, normals, medium.ior, Some(far_medium.ior));
+                    if DISPERSIVE && (medium.is_dispersive || far_medium.is_dispersive) {
+                        state.leave_companions();
+                    }
+                    // f32 has let pass what f64 reflects: at the last digit before the critical angle.
+                    let passes = kind == ScatterKind::Refraction;
+                    ((momentum / if passes { far_medium.ior } else { medium.ior }).normalize(), passes)
+                }
             }
         };
         if self.ledger.is_divided() {
             self.ledger.scatter(&ways(&sample, passes));
         }
-        if passes && far.is_some() {
-            let ratio = (far_medium.ior / medium.ior) as f32;
-            state.squeezed *= ratio * ratio;
-        }
         state.sees_through &= passes && sample.event != bsdf::Event::Diffuse;
-        match (sample.scattered, far) {
-            (Scattered::Straight, _) | (_, None) if passes => walk.cross(met),
-            (_, Some(far)) if passes => walk.pass(met, far),
-            _ => {}
-        }
-        if sample.scattered != Scattered::Straight {
-            walk.turn(met, turned, passes);
-        }
-        self.survives(state, u_roulette)
+        Some(Turn { direction: turned, passes, is_straight: sample.scattered == Scattered::Straight })
     }
 
     /// What looks for a surface that is not smooth has met one: of its material no more has to be known.
-    fn arrive(&mut self, walk: &Walk<'a>, met: &SurfacePoint, state: &mut State<N>) {
-        let lighting = self.setting.lighting;
-        if state.meets_lights()
-            && let Some(emitted) = lighting.emitted(&walk.ray, &met.hit, &state.wavelengths)
-        {
-            self.meet(state, walk.ray.direction, &emitted);
-        }
-        if state.purpose == Purpose::Photon && !lighting.replaces_material(&met.hit) {
+    fn arrive(&mut self, walk: &Walk<'a>, met: &Met, state: &mut State<N>) {
+        self.meet_emission(walk, met, state);
+        if state.purpose == Purpose::Photon && !self.setting.lighting.replaces_material(&met.hit) {
             let ior = self.media.of(walk.media.current()).ior;
             state.arrive::<DISPERSIVE>(met.point, &walk.ray, ior);
         }
     }
 
     /// Roulette: a path goes on with a probability in proportion to what it still carries.
-    fn survives(&self, state: &mut State<N>, u: f32) -> bool {
+    fn survives(&self, state: &mut State<N>, u: impl FnOnce() -> f32) -> bool {
         if state.purpose == Purpose::Focused {
             // Its densities stand in the weight of what it meets.
             return !state.throughput.is_black();
@@ -451,18 +471,44 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         if !(carried > 0.0 && carried.is_finite()) {
             return false;
         }
-        // Photons are not many paths.
+        // What is looked for is not many paths.
         if state.purpose == Purpose::Photon && state.depth.total() < ENDING_FROM {
             return true;
         }
         let most = if state.depth.total() < ENDING_FROM { 1.0 } else { MOST_LIKELY };
         let probability = (WORTHWHILE * carried / state.first.unwrap_or(1.0)).min(most);
-        if u >= probability {
+        if u() >= probability {
             return false;
         }
         state.throughput *= 1.0 / probability;
         true
     }
+}
+
+/// Where a path goes on from a surface.
+struct Turn {
+    direction: DVec3,
+    /// To the other side.
+    passes: bool,
+    /// As if nothing were met.
+    is_straight: bool,
+}
+
+/// The frame in which a surface scatters, and its geometric normal on the side of the ray that met it. The shading normal
+/// decides how light is scattered, the geometric one which side it is on.
+fn frame<const N: usize>(view: &View<'_>, ray: &Ray, met: &Met, finish: &Finish<N>) -> (Frame, DVec3) {
+    let (normal, tangent) = surface::normal_and_tangent(view, ray, &met.hit, &met.surface, finish.directed());
+    let toward = |n: DVec3| if ray.direction.dot(met.surface.n_g) > 0.0 { -n } else { n };
+    let n_g = toward(met.surface.n_g);
+    let mut normal = toward(normal);
+    if ray.direction.dot(normal) >= 0.0 {
+        normal = n_g;
+    }
+    let frame = match tangent {
+        Some(tangent) => Frame::along(normal, tangent),
+        None => Frame::about(normal),
+    };
+    (frame, n_g)
 }
 
 /// The ways in which the drawn direction is scattered, with their shares.

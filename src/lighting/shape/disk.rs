@@ -51,7 +51,7 @@ impl Disk {
 
     /// Density over the rectangle around it, where that is what is sampled.
     fn by_angle(&self, p: DVec3) -> Option<f64> {
-        self.around.solid_angle(p).filter(|&solid_angle| solid_angle >= NEAR).map(f64::recip)
+        self.around.sampled_solid_angle(p).filter(|&solid_angle| solid_angle >= NEAR).map(f64::recip)
     }
 
     fn by_area(&self, height: f64, distance: f64) -> f64 {

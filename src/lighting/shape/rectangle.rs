@@ -1,7 +1,8 @@
 //! The parallelogram, sampled by the solid angle that it subtends if it is a rectangle.
 //!
 //! C. Ureña, M. Fajardo, A. King, "An area-preserving parametrization for spherical rectangles", CGF 32(4), 2013; the symbols
-//! are theirs. From afar, where it makes next to no difference, and for a sheared rectangle, points are even over the area.
+//! are theirs. Where it makes little difference, from afar or straight before it, and for a sheared rectangle, points are even over the
+//! area.
 
 use std::f64::consts::PI;
 
@@ -12,9 +13,13 @@ use crate::math::trig::sin_cos;
 
 /// Below this solid angle the area is sampled: the rounding of the angles, 2^-50, is 2^-30 of it.
 const SMALLEST: f64 = 1.0 / 1_048_576.0;
-/// From so many of its longer sides' halves on the area is sampled: from there the density of its points by angle, which goes with the
-/// cube of their distances, hardly differs, by 3 % in root mean square.
-const FAR: f64 = 64.0;
+/// From so many of its longer sides' halves on points may be even over the area: before, their density by angle, which goes with the cube
+/// of their distances, has a pole nearby.
+const FAR: f64 = 2.0;
+/// They are where the distances differ little: with q from the middle to the receiver, q' its part along the plane and l half of the
+/// longer side, a distance's cube differs by √3 |q'| l / q² in root mean square, 35 % at this |q'| l / q². Measured in a room lit by a
+/// lamp: 3 % more error in 25 % less time; 0.1 is 1 % and 12 %, 0.3 is 9 % and 25 %.
+const OBLIQUE: f64 = 0.2;
 /// |cos| of the sides' angle up to which they count as perpendicular: rounding of a few products.
 const PERPENDICULAR: f64 = 1e-12;
 
@@ -113,6 +118,7 @@ impl Rectangle {
     }
 
     /// Height of a point over the plane; `None` on the side that is dark and in the plane.
+    #[inline]
     fn height(&self, p: DVec3) -> Option<f64> {
         let height = (p - self.center).dot(self.normal);
         (if self.is_two_sided { height != 0.0 } else { height > 0.0 }).then_some(height)
@@ -130,10 +136,13 @@ impl Rectangle {
         (seen.solid_angle >= SMALLEST).then_some(seen)
     }
 
-    /// The same where it is worth its while.
+    /// The same where it is worth its while: a point by solid angle takes several times as long as one by area.
     fn seen_from_near(&self, p: DVec3, height: f64) -> Option<Seen> {
         let longer = self.lengths[0].max(self.lengths[1]);
-        if (p - self.center).length_squared() > FAR * FAR * longer * longer { None } else { self.seen(p, height) }
+        let (l2, q2) = (longer * longer, (p - self.center).length_squared());
+        let along2 = q2 - height * height;
+        let is_even = q2 > FAR * FAR * l2 && along2 * l2 < OBLIQUE * OBLIQUE * q2 * q2;
+        if is_even { None } else { self.seen(p, height) }
     }
 
     /// How large it looks from a point, steradian; `None` where that is little and from where it is dark.
@@ -141,22 +150,33 @@ impl Rectangle {
         self.seen(p, self.height(p)?).map(|seen| seen.solid_angle)
     }
 
+    /// The same where that is what is sampled.
+    pub(in crate::lighting) fn sampled_solid_angle(&self, p: DVec3) -> Option<f64> {
+        self.seen_from_near(p, self.height(p)?).map(|seen| seen.solid_angle)
+    }
+
     pub(in crate::lighting) fn sample(&self, p: DVec3, u: [f64; 2]) -> Option<Toward> {
         let height = self.height(p)?;
-        let (to, by_angle) = match self.seen_from_near(p, height) {
-            Some(seen) => {
-                let [x, y] = seen.point(u).map(|a| a * height.abs());
-                (x * self.axes[0] + y * self.axes[1] - height * self.normal, Some(1.0 / seen.solid_angle))
-            }
-            None => {
-                let [s, t] = u.map(|u| 2.0 * u - 1.0);
-                (self.center + s * self.half[0] + t * self.half[1] - p, None)
-            }
-        };
+        if let Some(seen) = self.seen_from_near(p, height) {
+            return Some(self.by_angle(&seen, height, u));
+        }
+        let [s, t] = u.map(|u| 2.0 * u - 1.0);
+        let to = self.center + s * self.half[0] + t * self.half[1] - p;
         let distance = to.length();
-        let wi = to * (1.0 / distance);
-        let pdf_solid_angle = by_angle.unwrap_or_else(|| self.by_area(height, distance));
-        Some(Toward { wi, distance, pdf_solid_angle })
+        Some(Toward { wi: to * (1.0 / distance), distance, pdf_solid_angle: self.by_area(height, distance) })
+    }
+
+    /// By [the solid angle](Self::solid_angle) wherever it has one.
+    pub(in crate::lighting) fn sample_by_angle(&self, p: DVec3, u: [f64; 2]) -> Option<Toward> {
+        let height = self.height(p)?;
+        self.seen(p, height).map(|seen| self.by_angle(&seen, height, u))
+    }
+
+    fn by_angle(&self, seen: &Seen, height: f64, u: [f64; 2]) -> Toward {
+        let [x, y] = seen.point(u).map(|a| a * height.abs());
+        let to = x * self.axes[0] + y * self.axes[1] - height * self.normal;
+        let distance = to.length();
+        Toward { wi: to * (1.0 / distance), distance, pdf_solid_angle: 1.0 / seen.solid_angle }
     }
 
     /// Of the direction that meets it at `distance`.
@@ -171,9 +191,11 @@ impl Rectangle {
     }
 
     /// Distance at which a ray meets the side that shines, and where between the sides, −1..1.
+    #[inline]
     pub(in crate::lighting) fn meet(&self, origin: DVec3, direction: DVec3) -> Option<(f64, [f64; 2])> {
         let height = self.height(origin)?;
         let rise = direction.dot(self.normal);
+        // Most rays do not go there.
         if height * rise >= 0.0 {
             return None;
         }

@@ -55,7 +55,8 @@ fn probabilities_add_up_to_that_of_choosing_one() {
         for (p, n) in receivers() {
             let sum: f64 = ways.iter().map(|&way| tree.probability(p, n, way)).sum();
             let steps = 2000;
-            let chosen = (0..steps).filter(|&i| tree.sample(p, n, (f64::from(i) + 0.5) / f64::from(steps)).is_some());
+            let chosen =
+                (0..steps).filter(|&i| tree.sample(p, n, || (f64::from(i) + 0.5) / f64::from(steps)).is_some());
             let part = chosen.count() as f64 / f64::from(steps);
             // The intervals of what is not chosen begin and end somewhere within a step.
             assert!((sum - part).abs() < 0.01 && sum < 1.0 + 1e-9, "{count} lights: {sum}, {part}");
@@ -77,7 +78,7 @@ fn choices_have_the_probability_that_is_told() {
         let steps = 100_000;
         let mut counts = vec![0.0; ways.len()];
         for i in 0..steps {
-            let Some((light, probability)) = tree.sample(p, n, (f64::from(i) + 0.5) / f64::from(steps)) else {
+            let Some((light, probability)) = tree.sample(p, n, || (f64::from(i) + 0.5) / f64::from(steps)) else {
                 continue;
             };
             let told = tree.probability(p, n, ways[light as usize]);
@@ -136,7 +137,7 @@ fn the_tree_agrees_with_even_choice_and_is_better() {
     let count = 20_000;
     let mut moments = [[0.0; 2]; 2];
     for _ in 0..count {
-        let by_tree = tree.sample(p, Some(n), random.next()).map_or(0.0, |(i, q)| sent(&all[i as usize]) / q);
+        let by_tree = tree.sample(p, Some(n), || random.next()).map_or(0.0, |(i, q)| sent(&all[i as usize]) / q);
         let i = ((random.next() * all.len() as f64) as usize).min(all.len() - 1);
         let evenly = sent(&all[i]) * all.len() as f64;
         for (moments, value) in moments.iter_mut().zip([by_tree, evenly]) {
@@ -171,7 +172,7 @@ fn degenerate_clouds_have_trees() {
         let sum: f64 = ways.iter().map(|&way| tree.probability(p, None, way)).sum();
         assert!((sum - 1.0).abs() < 1e-9, "{sum}");
     }
-    assert!(LightTree::build(Vec::new(), |_, _| ()).sample(DVec3::ZERO, None, 0.5).is_none());
+    assert!(LightTree::build(Vec::new(), |_, _| ()).sample(DVec3::ZERO, None, || 0.5).is_none());
 }
 
 /// Spots that together look everywhere: none of them is lost where the cone of all has no axis.

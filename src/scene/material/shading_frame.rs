@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::ray::LocalSurface;
+use crate::ray::UnitNormals;
 
 /// Three unit vectors at right angles: right-handed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,16 +16,16 @@ pub struct ShadingFrame {
 }
 
 impl ShadingFrame {
-    /// About the surface `local` with the derivatives `tangents` of its point by the texture coordinates, where it has them; the
+    /// About a surface with these `normals` and the derivatives `tangents` of its point by the texture coordinates, where it has them; the
     /// normal of a map is (along ∂p/∂u, along ∂p/∂v, along the normal), of any length. `turns` turn the tangent
     /// counter-clockwise about the normal, as it is seen from outside.
     pub(in crate::scene) fn new(
-        local: &LocalSurface,
+        normals: &UnitNormals,
         tangents: Option<[DVec3; 2]>,
         normal_map: Option<[f32; 3]>,
         turns: f32,
     ) -> Self {
-        let n_s = local.n_s;
+        let UnitNormals { n_g, n_s } = *normals;
         let [along_u, along_v] = tangents.unwrap_or_else(|| {
             let u = n_s.any_orthonormal_vector();
             [u, n_s.cross(u)]
@@ -36,7 +36,7 @@ impl ShadingFrame {
             let v = if base.bitangent.dot(along_v) < 0.0 { -base.bitangent } else { base.bitangent };
             let bent = base.tangent * f64::from(x) + v * f64::from(y) + n_s * f64::from(z);
             // What leads under the surface, or nowhere, is no normal of it.
-            bent.try_normalize().filter(|bent| bent.dot(local.n_g) > 0.0).unwrap_or(n_s)
+            bent.try_normalize().filter(|bent| bent.dot(n_g) > 0.0).unwrap_or(n_s)
         });
         let frame = Self::about(normal, along_u);
         if turns == 0.0 {
@@ -60,10 +60,9 @@ impl ShadingFrame {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ray::{Curvature, NormalField};
 
-    fn flat(n_g: DVec3) -> LocalSurface {
-        LocalSurface { n_g, n_s: n_g, curvature: Curvature::Plane, field: NormalField::Flat }
+    fn flat(n_g: DVec3) -> UnitNormals {
+        UnitNormals { n_g, n_s: n_g }
     }
 
     fn is_orthonormal(frame: &ShadingFrame) {

@@ -3,6 +3,8 @@
 //! A dialect states [`Layers`] of registers. They are compiled once: what is constant becomes a number or a reflectance, and
 //! everything else a result of one bundle of programs, so that a constant material runs none.
 
+mod finish;
+
 use crate::bsdf::{Coat, Film, Interface, Metal, Parameters, SMOOTH_ALPHA, Sheen};
 use crate::diagnostics::Diagnostics;
 use crate::optics::Dispersion;
@@ -16,6 +18,9 @@ use super::Conductor;
 use super::appearance::UNSTATED;
 use super::network::Networks;
 use super::painter::{Painted, Painter};
+
+pub use finish::Finish;
+use finish::Plain;
 
 /// The highest index that is computed with; reflectances near 1 have none.
 const HIGHEST_INDEX: f32 = 1e4;
@@ -314,6 +319,8 @@ pub(super) enum IndexOf<'a> {
 pub struct Surface {
     /// Everything that differs from point to point; `None` where nothing does.
     looked_up: Option<Bundle>,
+    /// The short way, if it has one.
+    plain: Option<Plain>,
     reflectance: Option<MeasuredReflectance>,
     base_color: Tint,
     diffuse_roughness: Number,
@@ -362,6 +369,16 @@ pub struct SurfaceAt<const N: usize> {
 }
 
 impl<const N: usize> SurfaceAt<N> {
+    /// Whether light comes from behind.
+    pub fn transmits(&self) -> bool {
+        self.parameters.transmission > 0.0 || !self.parameters.diffuse_transmission.is_black()
+    }
+
+    /// Itself, if its normal or its tangent are not those of the shape alone.
+    pub fn directed(&self) -> Option<&Self> {
+        self.has_direction().then_some(self)
+    }
+
     /// Whether it matters which way its tangent points.
     #[allow(clippy::float_cmp, reason = "isotropic materials have the same number twice")]
     pub fn has_direction(&self) -> bool {
@@ -493,6 +510,7 @@ impl Surface {
         };
         let surface = Self {
             looked_up: None,
+            plain: None,
             reflectance: None,
             base_color: base(c.tint(layers.base_color)),
             diffuse_roughness: c.share(layers.diffuse_roughness),
@@ -517,7 +535,8 @@ impl Surface {
         };
         let Compiler { p, results } = c;
         let looked_up = if results.is_empty() { None } else { Some(p.b().bundle(&results)?) };
-        Ok(Self { looked_up, reflectance, ..surface })
+        let plain = if looked_up.is_none() { surface.plainly() } else { None };
+        Ok(Self { looked_up, plain, reflectance, ..surface })
     }
 
     /// The programs that light transport runs at every hit; `None` where everything is constant.

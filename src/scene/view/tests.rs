@@ -47,8 +47,8 @@ fn met(scene: &Scene, x: f64, y: f64) -> (SurfaceAt<4>, ShadingFrame, f32) {
     let media = Interface { ior_i: SampledSpectrum::ONE, ior_t: SampledSpectrum::ONE };
     let id = view.material_id(&hit);
     let at = view.surface(&hit, id, &visible::sample::<4>(0.6), media);
-    let (_, local) = view.aggregate.local_surface(&ray, &hit);
-    (at, view.shading_frame(&hit, 0.0, &local, &at), view.share_present(&hit, id))
+    let (_, normals) = view.aggregate.normals(&ray, &hit);
+    (at, view.shading_frame(&hit, 0.0, &normals, &at), view.share_present(&hit, id))
 }
 
 fn surface(driven: &[&str]) -> Value {

@@ -1,11 +1,12 @@
 //! What each model comes to, against the formulas of its specification.
 
+use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::super::dialect::every_id;
 use super::super::{Context, Kind, Material, SMOOTH_ROUGHNESS, ScalarIor, compile_alone};
 use super::*;
-use crate::bsdf::SMOOTH_ALPHA;
+use crate::bsdf::{Bsdf, SMOOTH_ALPHA};
 use crate::scene::description;
 use crate::spectrum::visible;
 
@@ -413,4 +414,43 @@ fn an_image_of_the_default_normal_is_no_map() {
     mapped.nodes = serde_json::from_value(tilted).expect("are nodes");
     let normal = constant(&compiled(&mapped).0).normal_map.expect("is tilted");
     normal.into_iter().zip([0.5, -1.0, 1.0]).for_each(|(a, b)| close(a, b));
+}
+
+#[test]
+fn the_short_way_scatters_as_the_long_one_does() {
+    let matt = json!({"base_color": [0.6, 0.3, 0.1], "specular_weight": 0.0});
+    let rough = json!({"base_color": [0.6, 0.3, 0.1], "specular_weight": 0.0, "base_diffuse_roughness": 0.7});
+    let glass = json!({"transmission_weight": 1.0, "specular_roughness": 0.0, "transmission_color": [0.9, 0.5, 0.7]});
+    let (air, water) = (SampledSpectrum::ONE, SampledSpectrum::splat(1.33));
+    let dispersive = SampledSpectrum([1.5, 1.51, 1.52, 1.53]);
+    let plastic = json!({"base_color": [0.6, 0.3, 0.1]});
+    for (inputs, ior_i, ior_t, is_short) in [
+        (&matt, air, air, true),
+        (&matt, water, air, false),
+        (&rough, air, air, true),
+        (&plastic, air, air, false),
+        (&glass, air, water, true),
+        (&glass, dispersive, air, true),
+    ] {
+        let (material, _) = compiled(&document(OPEN_PBR, inputs));
+        let interface = Interface { ior_i, ior_t };
+        let long = || material.surface.at(&[], &wavelengths(), interface);
+        let finish = material.surface.finish(&wavelengths(), interface, long);
+        assert_eq!(!matches!(finish, Finish::Other(_)), is_short, "{inputs}");
+        let (at, short) = (long(), finish.bsdf());
+        assert_eq!((finish.presence(), finish.transmits()), (at.presence, at.transmits()), "{inputs}");
+        assert!(finish.directed().is_none() && at.directed().is_none(), "{inputs}");
+        let long = Bsdf::new(&at.parameters);
+        let direction = |i: u32| {
+            let (z, turn) = (0.05 + 0.9 * (i as f32 * 0.37).fract(), i as f32 * 2.4);
+            let r = (1.0 - z * z).sqrt();
+            Vec3::new(r * turn.cos(), r * turn.sin(), z)
+        };
+        for i in 0..200 {
+            let (wo, wi, u) = (direction(i), direction(3 * i + 7), (i as f32 * 0.618).fract());
+            assert_eq!(short.evaluate(wo, wi), long.evaluate(wo, wi), "{inputs}");
+            assert_eq!(short.sample(wo, u, [1.0 - u, u]), long.sample(wo, u, [1.0 - u, u]), "{inputs}");
+            assert_eq!(short.is_smooth(), long.is_smooth(), "{inputs}");
+        }
+    }
 }
