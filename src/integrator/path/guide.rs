@@ -40,8 +40,8 @@ const WIDEST: f32 = 1.0;
 /// changes nothing where regions touch.
 const MARGIN: f64 = 0.25;
 
-/// Looks over the share that focused light has of all, and the most. In the caustics of `benches/RESULTS.md` twice as many leave 13 % (gem) or 6 %
-/// (ball) less error in a third more time; one at most leaves 13 or 18 % more.
+/// Looks over the share that focused light has of all, and the most. Error times time of the caustics of `benches/RESULTS.md`: 6 make 12 % (gem)
+/// and 6 % (ball) more, 4 make 6 % and 8 % more.
 const LOOKS: f32 = 8.0;
 const MOST: f32 = 4.0;
 

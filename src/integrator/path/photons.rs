@@ -17,9 +17,9 @@ use crate::lighting::Receiver;
 use crate::spectrum::visible::Visible;
 use crate::spectrum::{LANES, sensor};
 
-/// Photons for a pixel of the whole image, and the fewest and the most. They take about as long as samples. Half as many leave 20 % more error in the
-/// gem of `benches/RESULTS.md`, twice as many 6 % less.
-const PER_PIXEL: u64 = 8;
+/// Photons for a pixel of the whole image, and the fewest and the most. They take about as long as samples. Error times time of the gem of
+/// `benches/RESULTS.md` is 20 % more with two, and the same with eight, for which images of a few samples would wait twice as long.
+const PER_PIXEL: u64 = 4;
 const FEWEST: u64 = 1 << 12;
 const MOST: u64 = 1 << 18;
 
