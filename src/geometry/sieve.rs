@@ -4,7 +4,7 @@
 //! u = 2^-24, o the origin from which the ray walks, d = v − o for a corner v, S ≤ 1 in size the shear, x' = dx − S dz. Then:
 //!
 //! * v and o are rounded, by u|v| ≤ u(|o| + |d|) and u|o|; so is their difference: d errs by u(2|o| + 2|d|).
-//! * S errs by 3 u; with the product and the difference x' errs by u(4|o| + 2|dx| + 6|dz| + |x'|), where |dx| ≤ |x'| + |dz|.
+//! * S errs by 4 u; with the product and the difference x' errs by u(4|o| + 2|dx| + 7|dz| + |x'|), where |dx| ≤ |x'| + |dz|.
 //! * The ray that decides is beside the one that walks by no more than the padding of the boxes, p: it shifts x' by 2 p.
 //!
 //! Together less than ε = 2 p + 12 u (|o| + |dz| + |x'|). An edge function a × b of coordinates up to m errs by 4 ε m + 2 ε² for that
@@ -95,7 +95,7 @@ impl Sift for Packs {
         } else {
             [0, 1, 2]
         };
-        let [along, origin] = [moved.direction.extend(0.0), moved.origin].map(|v| v.to_array());
+        let [along, origin] = [moved.direction, moved.origin].map(|v| v.to_array());
         let per_z = moved.inverse.to_array()[axes[2]];
         let error = 2.0 * (moved.padding + PLACING) + RELATIVE * moved.origin.abs().max_element();
         Self::Ray {

@@ -10,18 +10,18 @@
 //!   two steps of f32 so that no rounding needs to be looked at; what underflows, the padding covers.
 //! * The direction. Components below 2^-64 are replaced by ±2^-64, so that 1/d is finite and 0·∞ cannot arise; over a
 //!   distance of 8, more than the diagonal and the way there, that moves the ray by 2^-61, which the padding of 2^-40 covers.
-//! * The distances. 1/d, the difference and the product err by 2^-24 relatively, together (1 + 2^-24)^3: multiplying far
-//!   distances by 1 + 2^-21 covers both sides of the comparison and the rounding of the limit (Ize 2013, "Robust BVH ray traversal", JCGT 2(2)).
+//! * The distances. d, 1/d, the difference and the product err by 2^-24 relatively, together (1 + 2^-24)^4: multiplying far
+//!   distances by 1 + 2^-20 covers both sides of the comparison and the rounding of the limit (Ize 2013, "Robust BVH ray traversal", JCGT 2(2)).
 //!   The relative error cannot change a sign, and distances below 0 are behind the start.
 
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec3, Vec4};
 
 use super::tree::{Child, Node, STACK, Tree, stack_of};
 
-const SMALLEST_DIRECTION: f64 = 1.0 / 18_446_744_073_709_551_616.0;
+const SMALLEST_DIRECTION: f32 = 1.0 / 18_446_744_073_709_551_616.0;
 const PADDING: f64 = 1.0 / 1_099_511_627_776.0;
 const RELATIVE_PADDING: f64 = 1.0 / 562_949_953_421_312.0;
-const FAR_FACTOR: f64 = 1.0 + 1.0 / 2_097_152.0;
+const FAR_FACTOR: f64 = 1.0 + 1.0 / 1_048_576.0;
 /// 2^-22, two steps of f32: an origin is rounded, and so is what is padded.
 const STEPS: f32 = 1.0 / 4_194_304.0;
 
@@ -39,11 +39,25 @@ pub(super) struct Moved {
     /// Where it enters the bounds of everything, or starts; the last lane is 0.
     pub(super) origin: Vec4,
     /// No component is 0.
-    pub(super) direction: Vec3,
+    pub(super) direction: Vec4,
     /// 1 over each.
     pub(super) inverse: Vec4,
     /// How far beside it the ray that decides may be, rounded up.
     pub(super) padding: f32,
+}
+
+impl Moved {
+    #[inline(always)]
+    fn new(origin: DVec3, direction: DVec3, padding: f64) -> Self {
+        let direction = direction.as_vec3().extend(1.0);
+        let sized = direction.abs().max(Vec4::splat(SMALLEST_DIRECTION)).copysign(direction);
+        Self {
+            origin: origin.as_vec3().extend(0.0),
+            direction: sized,
+            inverse: sized.recip(),
+            padding: padding as f32 * (1.0 + STEPS),
+        }
+    }
 }
 
 /// What knows more of the primitives than their boxes.
@@ -140,13 +154,12 @@ impl Tree {
         if padding >= 1.0 {
             return;
         }
-        let sized = |d: f64| d.abs().max(SMALLEST_DIRECTION).copysign(d);
-        let direction = DVec3::new(sized(direction.x), sized(direction.y), sized(direction.z));
-        let inverse = direction.recip();
         let mut limit = limit;
         let mut enter = start * scale;
         // From within or nearby, the boxes of the first node are all that can be missed.
         if origin.abs().max_element() > 1.0 || enter < -1.0 {
+            let sized = |d: f64| d.abs().max(SMALLEST_DIRECTION.into()).copysign(d);
+            let inverse = DVec3::new(sized(direction.x), sized(direction.y), sized(direction.z)).recip();
             let to_min = (self.bounds[0] - padding - origin) * inverse;
             let to_max = (self.bounds[1] + padding - origin) * inverse;
             enter = to_min.min(to_max).max_element().max(enter);
@@ -155,13 +168,7 @@ impl Tree {
                 return;
             }
         }
-        let moved = origin + direction * enter;
-        let moved = Moved {
-            origin: moved.as_vec3().extend(0.0),
-            direction: direction.as_vec3(),
-            inverse: inverse.as_vec3().extend(0.0),
-            padding: padding as f32 * (1.0 + STEPS),
-        };
+        let moved = Moved::new(origin + direction * enter, direction, padding);
         let sifted = sift.ray(&moved);
         let slabs = Slabs::new(&moved);
         // Distances from the moved origin.
