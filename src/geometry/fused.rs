@@ -202,6 +202,26 @@ mod tests {
     }
 
     #[test]
+    fn rays_that_are_no_numbers_meet_nothing() {
+        let mut numbers = Numbers(7);
+        let mut scenes = [scene(&mut numbers), scene(&mut Numbers(7))];
+        scenes[1].fused = None;
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for axis in 0..6 {
+                let mut parts = [0.5, 0.1, -0.2, 0.6, 0.0, 0.8];
+                parts[axis] = bad;
+                let [origin, direction] = [0, 3].map(|first| DVec3::from_slice(&parts[first..]));
+                let ray = Ray { origin, direction, time: 0.0 };
+                for scene in &scenes {
+                    let hit = scene.intersect(&ray, &Departures::none());
+                    assert!(hit.is_none_or(|hit| !hit.distance.is_nan()), "{ray:?} {hit:?}");
+                    scene.is_blocked(&ray, &Departures::none(), 2.0, |_| false);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn little_and_much_are_left_as_they_are() {
         let one = |count: usize| {
             let instance = Instance { shape: octahedron(), world_from_object: DAffine3::IDENTITY.into() };

@@ -271,7 +271,8 @@ impl Slabs {
             .max(plane(1, 0, &self.near_origin))
             .max(plane(2, 0, &self.near_origin).max(Vec4::ZERO));
         let far = plane(0, 1, &self.far_origin).min(plane(1, 1, &self.far_origin)).min(plane(2, 1, &self.far_origin));
-        let passed = near.cmple((far * FAR_FACTOR as f32).min(Vec4::splat(farthest)));
+        // The second one where it is not a number: of a ray that has none, no lane is passed.
+        let passed = near.cmple(Vec4::splat(farthest).min(far * FAR_FACTOR as f32));
         (near.to_array(), passed.bitmask())
     }
 }
