@@ -5,12 +5,12 @@
 //! Space is divided into regions with about as many photons each. A region keeps the points of the glass that its photons
 //! left, so that directions to them are right from everywhere in it (as the parallax-aware mixtures of L. Ruppert, S. Herholz, H. Lensch,
 //! "Robust fitting of parallax-aware mixtures for path guiding", TOG 39(4), 2020), and gives each two caps of directions as wide as its
-//! neighbours are far; where the image of the light that the photon knows (`image.rs`) is smaller than the narrow one, it takes its place. The density
-//! of a direction is the sum over the lobes it is in.
+//! neighbours are far; where the image of the light that the photon knows (`image.rs`) is smaller than the narrow one, it takes its
+//! place. The density of a direction is the sum over the lobes it is in.
 //!
-//! At an interface a photon was reflected or went through, and a look that is drawn from its narrow lobe does the same (as Z. Fan et al., "Manifold path
-//! guiding for importance sampling specular chains", TOG 42(6), 2023, choose the chain's kind): what a facet mirrors faintly is found
-//! with certainty. Looks from wide caps choose by chance, like paths.
+//! At an interface a photon was reflected or went through, and a look that is drawn from its narrow lobe does the same (as Z. Fan et
+//! al., "Manifold path guiding for importance sampling specular chains", TOG 42(6), 2023, choose the chain's kind): what a facet mirrors
+//! faintly is found with certainty. Looks from wide caps choose by chance, like paths.
 //!
 //! A guide only says where to look. What is found is weighed against the BSDF's own directions, so that a poor guide costs time and
 //! never light.
@@ -18,10 +18,11 @@
 use std::f32::consts::TAU;
 use std::ops::Range;
 
-use super::image::{Image, ImageLobe, ImageLobes};
-use super::state::Way;
 use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
+
+use super::image::{Image, ImageLobe, ImageLobes};
+use super::state::Way;
 
 /// Photons of a region at least, twice as many at most. Error of the caustics of `benches/RESULTS.md`: 32 or 64 make up to 4 % more, 128
 /// and 256 up to 20 %.

@@ -2,9 +2,9 @@
 //!
 //! Along a fixed chain the place on the light is a smooth function of the point x from which one looks and of the direction; through
 //! flat facets it is nearly affine. A photon takes with it the columns of its ray's Jacobian by its place on the light and by its
-//! direction there (`ray/`); where it arrives their inverse is that function's derivative. So one photon knows the whole image of the light, and how
-//! it moves and turns as seen from all about: the linearised specular manifold of W. Jakob, S. Marschner, "Manifold exploration", TOG 31(4), 2012, as a
-//! lobe of a guide.
+//! direction there (`ray/`); where it arrives their inverse is that function's derivative. So one photon knows the whole image of the
+//! light, and how it moves and turns as seen from all about: the linearised specular manifold of W. Jakob, S. Marschner, "Manifold
+//! exploration", TOG 31(4), 2012, as a lobe of a guide.
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec3, Vec4};
 
