@@ -42,20 +42,7 @@ fn ball(rings: usize) -> (Vec<[f32; 3]>, Vec<i32>) {
 }
 
 fn mesh(points: &Buffer<[f32; 3]>, counts: &[i32], indices: &Buffer<i32>) -> Mesh {
-    let polygons = PolygonMesh {
-        path: "/Ball",
-        points: points.clone(),
-        counts,
-        indices: indices.clone(),
-        holes: &[],
-        left_handed: false,
-        normals: None,
-        uv: None,
-        uv_number: None,
-        primvars: Vec::new(),
-        subsets: &[],
-        subdivision: None,
-    };
+    let polygons = PolygonMesh::bare("/Ball", points.clone(), counts, indices.clone());
     Mesh::from_polygons(&polygons).expect("a ball").0
 }
 

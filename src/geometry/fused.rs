@@ -12,9 +12,10 @@ use super::sieve::{PLACING, Packs};
 use super::start::UNIT_ROUNDOFF;
 use super::tree::{Bounds, Tree};
 
-/// Triangles of a mesh at most: larger ones are worth a tree of their own, whose boxes are as good and whose triangles cost less memory.
+/// Triangles of a mesh at most: on the way to one of so many, getting ready for a second tree is little, and here a
+/// triangle costs 40 bytes or more beside its box.
 const MESH: usize = 1 << 14;
-/// Triangles in all, and other instances beside them at most. Fewer triangles are as well off in the boxes of their meshes
+/// Triangles in all, and other instances beside them at most: about 10 MB. Fewer triangles are as well off in the boxes of their meshes
 /// (`benches/RESULTS.md`, `diffuse` and `ball`: 8 of them, 2 and 8 % more instructions fused; `gem`: 88, 17 % less).
 const TRIANGLES: Range<usize> = 32..1 << 17;
 pub(super) const OTHERS: usize = 1 << 12;
@@ -120,20 +121,8 @@ mod tests {
     }
 
     fn mesh(points: Vec<[f32; 3]>, indices: Vec<i32>) -> Arc<Shape> {
-        let polygons = PolygonMesh {
-            path: "/Mesh",
-            points: Buffer::from_vec(points),
-            counts: &vec![3; indices.len() / 3],
-            indices: Buffer::from_vec(indices),
-            holes: &[],
-            left_handed: false,
-            normals: None,
-            uv: None,
-            uv_number: None,
-            primvars: Vec::new(),
-            subsets: &[],
-            subdivision: None,
-        };
+        let counts = vec![3; indices.len() / 3];
+        let polygons = PolygonMesh::bare("/Mesh", Buffer::from_vec(points), &counts, Buffer::from_vec(indices));
         Arc::new(Shape::Mesh(Mesh::from_polygons(&polygons).unwrap().0))
     }
 

@@ -102,6 +102,24 @@ pub struct PolygonMesh<'a> {
 }
 
 impl<'a> PolygonMesh<'a> {
+    /// Points and faces with nothing else to them, counter-clockwise seen from outside.
+    pub fn bare(path: &'a str, points: Buffer<[f32; 3]>, counts: &'a [i32], indices: Buffer<i32>) -> Self {
+        Self {
+            path,
+            points,
+            counts,
+            indices,
+            holes: &[],
+            left_handed: false,
+            normals: None,
+            uv: None,
+            uv_number: None,
+            primvars: Vec::new(),
+            subsets: &[],
+            subdivision: None,
+        }
+    }
+
     /// An error at one of the mesh's attributes.
     fn error(&self, attribute: &str, problem: impl Into<String>) -> Error {
         Error::scene(format!("{}.{attribute}", self.path), problem)

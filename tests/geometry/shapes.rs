@@ -7,20 +7,7 @@ use glam::{DAffine3, DVec3};
 
 /// A mesh without attributes.
 pub(crate) fn polygons<'a>(points: &[[f32; 3]], counts: &'a [i32], indices: &[i32]) -> PolygonMesh<'a> {
-    PolygonMesh {
-        path: "/Mesh",
-        points: Buffer::from_vec(points.to_vec()),
-        counts,
-        indices: Buffer::from_vec(indices.to_vec()),
-        holes: &[],
-        left_handed: false,
-        normals: None,
-        uv: None,
-        uv_number: None,
-        primvars: Vec::new(),
-        subsets: &[],
-        subdivision: None,
-    }
+    PolygonMesh::bare("/Mesh", Buffer::from_vec(points.to_vec()), counts, Buffer::from_vec(indices.to_vec()))
 }
 
 pub(crate) fn mesh(points: &[[f32; 3]], counts: &[i32], indices: &[i32]) -> (Mesh, MeshReport) {

@@ -54,20 +54,8 @@ impl Cage {
             corner_indices: &corner_indices,
             corner_sharpnesses: Some(Buffer::from_vec(corner_sharpnesses)),
         };
-        let polygons = PolygonMesh {
-            path: "/Cage",
-            points: Buffer::from_vec(self.points.clone()),
-            counts: &counts,
-            indices: Buffer::from_vec(indices),
-            holes: &[],
-            left_handed: false,
-            normals: None,
-            uv: None,
-            uv_number: None,
-            primvars: Vec::new(),
-            subsets: &[],
-            subdivision: None,
-        };
+        let polygons =
+            PolygonMesh::bare("/Cage", Buffer::from_vec(self.points.clone()), &counts, Buffer::from_vec(indices));
         f(&polygons, &subdivision)
     }
 

@@ -32,7 +32,7 @@ use crate::scene::view::View;
 use crate::spectrum::{SampledSpectrum, Wavelengths, visible};
 
 /// A path is worth going on for certain while it carries more than 1 over this of what it carried after its first scattering, which is
-/// about what the pixel is worth. Error times time is flat from 1.5 to 4; without (1, from the fourth vertex on) it is 1.4 to 1.6 times
+/// about what the pixel is worth. Error times time is flat from 1.5 to 4; without (1, from the fourth vertex on) it is 1.3 to 1.6 times
 /// as much.
 const WORTHWHILE: f32 = 2.0;
 
@@ -471,7 +471,7 @@ impl<'a, const N: usize, const DISPERSIVE: bool> Tracer<'a, N, DISPERSIVE> {
         if !(carried > 0.0 && carried.is_finite()) {
             return false;
         }
-        // What is looked for is not many paths.
+        // Photons are few beside paths.
         if state.purpose == Purpose::Photon && state.depth.total() < ENDING_FROM {
             return true;
         }
